@@ -11,7 +11,7 @@ from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 
-from orchestrator.live.assembly import live_page
+from orchestrator.live.presets import live_page
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 

@@ -1,4 +1,4 @@
-"""What the numbers of the scenarios owe to the step: the tables of docs/explanation/accuracy.md.
+"""What the step does to the numbers of the scenarios, for docs/explanation/accuracy.md.
 
 `python tools/accuracy.py` prints them in Markdown. All runs are without measurement noise. The
 batch engine makes them; only the body that moves freely is run by the FMU. It takes three minutes

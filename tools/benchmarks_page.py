@@ -1,9 +1,10 @@
-"""Measure again what docs/reference/benchmarks.md says.
+"""Measure again what docs/reference/benchmarks.md quotes.
 
-`python tools/benchmarks_page.py [NAME...]` runs the command that the page has between
-`<!-- filled: NAME -->` and `<!-- / -->`, and writes its output there, with the date, the machine
-and its load. Without a name it runs all commands, which takes an hour or two of an idle machine.
-Where a command fails, the page keeps what it has, and the exit status is 1.
+`python tools/benchmarks_page.py [NAME...]` runs the command in the first line of each file
+`benchmarks/results/NAME.txt`, and writes its output there, with date, machine and load. Without a
+name it runs all commands, which takes an hour or two of an idle machine. A test then names the
+numbers of the page that no file has any more. Where a command fails, the file stays as it is, and
+the exit status is 1.
 """
 
 from __future__ import annotations
@@ -20,35 +21,42 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 
-PAGE = ROOT / "docs" / "reference" / "benchmarks.md"
-
-_PLACE = re.compile(r"<!-- filled: (\w+) -->\n`python (.+?)`.*?<!-- / -->", re.DOTALL)
+RESULTS = ROOT / "benchmarks" / "results"
 
 
 def main() -> int:
-    """Run commands of the page, and write what they print into it."""
+    """Run commands, and keep what they print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    places = dict(_PLACE.findall(PAGE.read_text(encoding="utf-8")))
-    parser.add_argument("name", nargs="*", help=f"one of {', '.join(places)}; default: all")
-    names = parser.parse_args().name or list(places)
-    if unknown := set(names) - places.keys():
-        parser.error(f"{', '.join(sorted(unknown))}: choose from {', '.join(places)}")
-    failed = [name for name in names if not is_written(name, places[name])]
+    files = {file.stem: file for file in sorted(RESULTS.glob("*.txt"))}
+    parser.add_argument("name", nargs="*", help=f"one of {', '.join(files)}; default: all")
+    names = parser.parse_args().name or list(files)
+    if unknown := set(names) - files.keys():
+        parser.error(f"{', '.join(sorted(unknown))}: choose from {', '.join(files)}")
+    failed = [name for name in names if not is_written(files[name])]
     return 1 if failed else 0
 
 
-def is_written(name: str, command: str) -> bool:
-    """Whether a command runs to its end, and the page has what it prints."""
+def is_written(file: Path) -> bool:
+    """Whether the command of a file runs to its end; then the file has what it prints."""
+    command = command_of(file)
     try:
-        write_part(name, measured(name, command))
+        file.write_text(measured(command), encoding="utf-8")
     except subprocess.CalledProcessError as error:
-        print(f"{name} stays as it is: {command}: exit status {error.returncode}", file=sys.stderr)
+        print(
+            f"{file.stem} stays as it is: {command}: exit status {error.returncode}",
+            file=sys.stderr,
+        )
         return False
     return True
 
 
-def measured(name: str, command: str) -> str:
-    """The part of the page about a command that is run now."""
+def command_of(file: Path) -> str:
+    """The command in the first line of a file, without `$ python `."""
+    return file.read_text(encoding="utf-8").partition("\n")[0].removeprefix("$ python ")
+
+
+def measured(command: str) -> str:
+    """A command that is run now, with its output."""
     where = machine()
     output = subprocess.run(
         [sys.executable, *shlex.split(command)],
@@ -57,10 +65,7 @@ def measured(name: str, command: str) -> str:
         stdout=subprocess.PIPE,
         encoding="utf-8",
     ).stdout
-    return (
-        f"<!-- filled: {name} -->\n`python {command}`, {date.today()}, {where}:\n\n"
-        f"```text\n{output.rstrip()}\n```\n<!-- / -->"
-    )
+    return f"$ python {command}\n{date.today()}, {where}\n\n{output.rstrip()}\n"
 
 
 def machine() -> str:
@@ -73,16 +78,6 @@ def machine() -> str:
     processor = listed[1] if listed else platform.machine()
     load = f", load {os.getloadavg()[0]:.0f}" if hasattr(os, "getloadavg") else ""
     return f"{processor}, {os.cpu_count()} cores{load}"
-
-
-def write_part(name: str, part: str) -> None:
-    """Put a part in the place of the page's own."""
-
-    def chosen(place: re.Match[str]) -> str:
-        return part if place[1] == name else place[0]
-
-    text = PAGE.read_text(encoding="utf-8")
-    PAGE.write_text(_PLACE.sub(chosen, text), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -50,7 +50,6 @@ _MADE = {
     "robustness": {
         "ratio_of_fig_7": "omega_d == 0.1 and abs(A_d - 2 * A_f) < 1e-9",
         "chattering": "ratio_of_fig_7 and 6 < A_f < 22",
-        "valley": "omega_d == 1 and abs(A_d - A_f) < 1e-9",
     },
     "sampling": {"product": "k_d * step"},
 }
@@ -66,36 +65,18 @@ _LINES = {
         share failed by noise_std | h_max == 0.002
         max late_error by scenario noise_std | h_max == 0.002
         bound lost by noise_std | proposed and h_max == 0.002
-        bound lost by noise_std | proposed and h_max == 0.002 and physical
         n by scenario noise_std | h_max == 0.02 and failed
         min speed by noise_std | failed
         min turn by noise_std | failed
-        max ended by noise_std | failed
-        max late_error by scenario noise_std | h_max == 0.02 and not failed
-        n by scenario noise_std | h_max == 0.02 and not failed and lost
         share saturated by scenario noise_std | h_max == 0.002 and physical
         median saturated_fraction_u by scenario noise_std | h_max == 0.002 and physical
-        max saturated_fraction_u by scenario noise_std | h_max == 0.002 and physical
-        share saturated by scenario noise_std | h_max == 0.002 and physical and way < 20
-        share saturated by scenario noise_std | h_max == 0.002 and physical and way > 70
         median peak_command_u by scenario noise_std | h_max == 0.002 and physical
-        share saturated by noise_std | proposed and h_max == 0.002 and speed < 1
-        share saturated by noise_std | proposed and h_max == 0.002 and 6 < speed < 12
-        share saturated by noise_std | proposed and h_max == 0.002 and speed > 12
-        median peak_command_u by noise_std | proposed and h_max == 0.002 and speed < 1
-        median peak_command_u by noise_std | proposed and h_max == 0.002 and 6 < speed < 12
-        median peak_command_u by noise_std | proposed and h_max == 0.002 and speed > 12
-        median peak_command_u by scenario noise_std | h_max == 0.002 and physical and way < 12
-        median peak_command_u by scenario noise_std | h_max == 0.002 and physical and 25 < way < 35
         median peak_command_u by scenario noise_std | h_max == 0.002 and physical and way > 70
         median time_to_reach by scenario noise_std | h_max == 0.002 and physical and 45 < way < 55
         median late_error by scenario noise_std | h_max == 0.002 and physical and 45 < way < 55
     """,
     "distance": """
         n by scenario step noise_std
-        median peak_command_u by step noise_std | proposed
-        median peak_command_q by step noise_std | proposed
-        median peak_command_r by step noise_std | proposed
         max peak_command_u by step noise_std | proposed
         max peak_command_q by step noise_std | proposed
         max peak_command_r by step noise_std | proposed
@@ -106,69 +87,28 @@ _LINES = {
         median peak_command_u by step noise_std | proposed and 30 / 1.1 < way < 30 * 1.1
         median peak_command_u by step noise_std | proposed and 100 / 1.1 < way < 100 * 1.1
         median peak_command_u by step noise_std | proposed and 1e3 / 1.1 < way < 1e3 * 1.1
-        median peak_command_u by step noise_std | proposed and way > 9e3
-        median saturated_fraction_u by step noise_std | proposed and 100 / 1.1 < way < 100 * 1.1
-        median saturated_fraction_u by step noise_std | proposed and 1e3 / 1.1 < way < 1e3 * 1.1
-        median saturated_fraction_u by step noise_std | proposed and way > 9e3
         min peak_command_u by step noise_std | PD
-        median peak_command_u by step noise_std | PD and way < 11
         median peak_command_u by step noise_std | PD and 30 / 1.1 < way < 30 * 1.1
         median peak_command_u by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
         median peak_command_u by step noise_std | PD and 1e3 / 1.1 < way < 1e3 * 1.1
-        max peak_command_u by step noise_std | PD
-        max peak_command_q by step noise_std | PD
-        max peak_command_r by step noise_std | PD
-        median saturated_fraction_u by step noise_std | PD and 50 / 1.1 < way < 50 * 1.1
-        median saturated_fraction_u by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
-        median saturated_fraction_q by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
-        median saturated_fraction_r by step noise_std | PD and 100 / 1.1 < way < 100 * 1.1
         min saturated_fraction_u by step noise_std | PD and way > 300
-        min saturated_fraction_q by step noise_std | PD and way > 300
-        min saturated_fraction_r by step noise_std | PD and way > 300
         median time_to_reach by scenario step noise_std | 100 / 1.1 < way < 100 * 1.1
-        max time_to_reach by scenario step noise_std
         min effort_ratio by step noise_std | PD and way > 100
         max effort_ratio by step noise_std | PD and way > 100
         median final_error by scenario step noise_std | 100 / 1.1 < way < 100 * 1.1
-        median final_error by scenario step noise_std | 1e3 / 1.1 < way < 1e3 * 1.1
-        median final_error by scenario step noise_std | way < 11
-        median final_error by scenario step noise_std | way > 9e3
-        median theta_hat_end_1 by scenario step noise_std | way < 11
-        median theta_hat_end_1 by scenario step noise_std | way > 9e3
-        max theta_hat_end_1 by scenario step noise_std
-        median theta_hat_end_1 by scenario step noise_std | 1e3 / 1.1 < way < 1e3 * 1.1
     """,
     "formation": """
         n
         n | failed
-        median smallest_distance
         min smallest_distance
-        share close
-        share close | A_d < 5
-        share close | good
         min smallest_distance | good
         share leader_saturates
         share follower_saturates
         share follower_saturates | good
-        median auv2_peak_command_u
-        median auv2_peak_command_u | good
-        median auv2_saturated_fraction_u
-        median auv2_saturated_fraction_u | good
-        share close | A_d < 5 and loss > 0.8
-        share close | A_d < 5 and latency > 3.5
         share close | A_d > 10
-        median smallest_distance | A_d < 5 and latency < 1 and loss < 0.2
-        median smallest_distance | A_d < 5 and latency < 1 and loss > 0.8
-        median smallest_distance | A_d < 5 and latency > 3.5 and loss < 0.2
         rank smallest_distance latency
         rank smallest_distance loss
         rank smallest_distance A_d
-        median auv1_late_error | A_d < 5
-        median auv2_late_error | A_d < 5
-        median auv1_late_error | A_d > 10
-        median auv2_late_error | A_d > 10
-        rank auv2_late_error loss
-        rank auv1_late_error loss
     """,
     "gains": """
         n by scenario
@@ -182,36 +122,16 @@ _LINES = {
         median peak_command_u by scenario | 4 / 1.1 < lam < 4 * 1.1
         share saturated | proposed and lam > 2
         min peak | proposed and lam > 2
-        median late_error by tenth_lam | proposed
         median late_error by tenth_eps_t | proposed
-        median total_variation_u by tenth_eps_t | proposed
         median late_error by tenth_sigma | proposed
         median late_error by tenth_gamma | proposed
         median late_error by tenth_k_d | proposed
-        median late_error by tenth_K1_1 | proposed
-        median late_error by tenth_K1_2 | proposed
-        median late_error by tenth_K1_3 | proposed
         median late_error by tenth_K2_1 | proposed
         median late_error by tenth_K2_2 | proposed
         median late_error by tenth_K2_3 | proposed
-        rank late_error lam | proposed
-        rank late_error k_d | proposed
-        rank late_error K2_1 | proposed
-        rank late_error K2_2 | proposed
-        rank late_error K2_3 | proposed
-        rank late_error gamma | proposed
-        rank late_error sigma | proposed
-        n by scenario | peak <= 10
-        min late_error by scenario | peak <= 10
-        min late_error by scenario | peak <= 20
-        min late_error by scenario | peak <= 80
-        min l2_effort_u by scenario | not lost
     """,
     "noise": """
         median gain | proposed and noise_std < 0.003
-        min gain | proposed and noise_std < 0.003
-        max gain | proposed and noise_std < 0.003
-        max gain | proposed and noise_std < 0.003 and k_d > 2.5
         max product | proposed and not saturated
         min product | proposed and saturated
         min noise_std | proposed and saturated and 50 / 1.1 < k_d
@@ -226,12 +146,7 @@ _LINES = {
         median theta_hat_end_1 by scenario | 0.018 < noise_std < 0.022
         median theta_hat_half_1 by scenario | noise_std < 0.0002
         median theta_hat_end_1 by scenario | noise_std < 0.0002
-        median late_error | proposed and product < 0.003
-        median late_error | proposed and 0.03 < product < 0.037
-        share lost | proposed and k_d > 20 and noise_std < 0.03
         share lost | proposed and k_d > 20 and 0.06 < noise_std
-        share lost | proposed and k_d < 5 and 0.06 < noise_std
-        median saturated_fraction_u | proposed and k_d > 20 and 0.06 < noise_std
     """,
     "robustness": """
         n by noise_std
@@ -242,38 +157,20 @@ _LINES = {
         max A_d by scenario omega_d noise_std | step == 0.005 and A_f == 0.5 and kept_d
         max late_error by A_f step noise_std | proposed and ratio_of_fig_7 and A_f < 6
         min A_f by scenario step noise_std | ratio_of_fig_7 and lost
-        min A_f by scenario step noise_std | ratio_of_fig_7 and saturated
-        max late_error by scenario step noise_std | ratio_of_fig_7 and 6.9 < A_f < 7
-        max peak_command_u by scenario step noise_std | ratio_of_fig_7 and 6.9 < A_f < 7
-        max A_f by scenario step noise_std | valley and not lost
-        min A_f by scenario step noise_std | valley and lost
         max late_error by scenario step noise_std
-        min A_d by noise_std | late_error > 180
         max total_variation_u by A_f scenario noise_std | step == 0.02 and chattering
         max total_variation_u by A_f scenario noise_std | step == 0.005 and chattering
     """,
     "sampling": """
         n
-        median estimate_error by observer | proposed and product < 1.9
         median peak_command_u by observer | proposed and product < 1.9
-        max peak_command_u by observer | proposed and product < 1.9
         min product | proposed and observer == "euler" and peak_command_u > 45
         max product | proposed and observer == "euler" and peak_command_u < 45
-        median estimate_error | proposed and observer == "euler" and product > 2
-        median late_error | proposed and observer == "euler" and product > 2
-        median peak_command_u | proposed and observer == "euler" and product > 2
         median estimate_error | proposed and observer == "exact" and product > 10
-        max product
         median l2_effort_q by scenario | observer == "exact" and step < 0.0022
-        median l2_effort_q by scenario | observer == "exact" and 0.009 < step < 0.011
         median l2_effort_q by scenario | observer == "exact" and 0.019 < step < 0.021
         median l2_effort_q by scenario | observer == "exact" and step > 0.09
-        median l2_effort_u | PD and step < 0.03
-        median l2_effort_u | PD and step > 0.045
-        median late_error | PD and step < 0.03
-        median late_error | PD and step > 0.09
         min step | PD and total_variation_u > 1e5
-        max step | PD and total_variation_u < 1e5
     """,
 }
 
@@ -313,7 +210,6 @@ def prepared(study: str, runs: pd.DataFrame) -> pd.DataFrame:
     if "scenario" in runs:
         runs["proposed"], runs["PD"] = runs.scenario == "fig5", runs.scenario == "fig5-pd"
     runs["failed"] = runs.failure.fillna("") != ""
-    runs["ended"] = runs.failure.str.extract(r" t = (\S+) s", expand=False).astype(float)
     # Of several vehicles, the largest.
     runs["late_error"] = runs.filter(regex="(^|_)late_error$").max(axis=1)
     runs["lost"] = ~(runs.late_error <= 1.0)

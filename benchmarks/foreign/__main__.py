@@ -16,9 +16,9 @@ from pathlib import Path
 
 from collect import collect, collected
 from compare import compared
-from page import page
+from page import listed, page
 
-#: The page that is written.
+#: The page that is written, with its table beside it.
 PAGE = Path(__file__).parents[2] / "docs" / "reference" / "tested-fmus.md"
 
 
@@ -45,6 +45,7 @@ def main() -> None:
         if item.name in found
     ]
     PAGE.write_text(page(known, len(host.splitlines())), encoding="utf-8")
+    PAGE.with_suffix(".csv").write_text(listed(known), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,11 +1,13 @@
-"""docs/reference/tested-fmus.md from what came of every file."""
+"""docs/reference/tested-fmus.md and tested-fmus.csv from what came of every file."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from csv import writer
 from importlib.metadata import PackageNotFoundError, version
+from io import StringIO
 from typing import Any
 
 from compare import STEPS
@@ -18,8 +20,7 @@ SYSTEM_BOUND, FMU_BOUND = 1e-9, 1e-12
 _HOST = "host"
 EXPLANATIONS: Mapping[tuple[str, str], str] = {
     ("/LinearTransformation3/", "libcosim"): "it applies no parameter sets of the system",
-    ("/algebraic_loop_", "ecos"): "it hands inputs over before it reads outputs, so a direct "
-    "feedthrough shows a step earlier",
+    ("/algebraic_loop_", "ecos"): "direct feedthrough shows a step earlier",
     ("/0004_Atmos.fmu", _HOST): "its output `CPUtime` is the processor's",
 }
 
@@ -46,24 +47,16 @@ _OUTCOMES = {
 _HEAD = """\
 # Public FMUs and SSP archives, tested
 
-This page lists public FMUs and SSP archives, and says which of them run in auv-fmu. `python
-benchmarks/foreign FOLDER` writes it. It clones public repositories at named commits, collects every
-FMU and every SSP archive in them, and runs each in a separate process.
+Which public FMUs and SSP archives run in auv-fmu. `python benchmarks/foreign FOLDER` writes this
+page and [tested-fmus.csv](tested-fmus.csv), which says of every file that does not run why, and of
+every archive what its run reported. It clones public repositories at named commits, and runs each
+file in a process of its own; files with the same bytes count once.
 
-- **Archives** are run unchanged, in the default order, for {steps} steps or to the end that they
-  name, whichever comes first. A folder with a `SystemStructure.ssd` is zipped as it is, and each
-  further `.ssd` in it counts as another archive.
-- **FMUs** are run one by one, for {steps} steps with all inputs at their start values. The step is
-  the one that the FMU names, else 20 ms.
-- Files with the same bytes are counted once.
-
-The results are compared with other programs: {tools}.
-
-- **Systems** that libcosim or ecos can also run are compared in Jacobi order, with algebraic loops
-  delayed and the same steps. libcosim also runs them as `auv-fmu export --format osp` writes them
-  after we have read them.
-- **FMUs** are compared with a plain host of {host} lines, which shares no code with the master and
-  takes steps at t_k = k h.
+- **Archives** run unchanged, in the default order, for {steps} steps or to the end that they name.
+  They are compared in Jacobi order with {tools}.
+  libcosim also runs them as `auv-fmu export --format osp` writes them.
+- **FMUs** run one by one, for {steps} steps with all inputs at their start values. They are
+  compared with a plain host of {host} lines, which shares no code with the master.
 - **A deviation** is the largest over all Real outputs and steps, relative to the size of an output
   where that is above one.
 """
@@ -71,11 +64,33 @@ The results are compared with other programs: {tools}.
 
 def page(found: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
     """The page."""
-    head = _HEAD.format(steps=STEPS, host=lines_of_host, tools=", ".join(_tools()))
-    archives = [one for one in found if not one["is_fmu"]]
-    fmus = [one for one in found if one["is_fmu"]]
-    parts = [head, *_archives(archives), *_fmus(fmus), *_parameters(fmus), *_absent(found)]
-    return "\n".join(parts)
+    head = _HEAD.format(steps=STEPS, host=lines_of_host, tools=" and ".join(_tools()))
+    there = [one for one in found if one["outcome"] != "absent"]
+    archives = [one for one in there if not one["is_fmu"]]
+    fmus = [one for one in there if one["is_fmu"]]
+    parts = [head.rstrip("\n"), *_archives(archives), *_fmus(fmus), *_parameters(fmus)]
+    return "\n".join([*parts, *_not_running(archives, fmus), ""])
+
+
+def listed(found: Sequence[Mapping[str, Any]]) -> str:
+    """The table of files, in CSV: what does not run and why, and what archives report."""
+    text = StringIO()
+    table = writer(text, lineterminator="\n")
+    table.writerow(("kind", "file", "outcome"))
+    for one in found:
+        kind = "FMU" if one["is_fmu"] else "archive"
+        changed = one.get("changed", {})
+        if changed.get("lost"):
+            table.writerow((kind, _name(one), f"does not take {', '.join(changed['lost'])}"))
+        if changed.get("outcome", "runs") != "runs":
+            table.writerow((kind, _name(one), f"with other parameters {_why(changed)}"))
+        if one["outcome"] == "absent":
+            table.writerow((kind, _name(one), "could not be fetched"))
+        elif one["outcome"] != "runs":
+            table.writerow((kind, _name(one), _why(one)))
+        elif not one["is_fmu"]:
+            table.writerow((kind, _name(one), f"runs: {_said(one['said'])}"))
+    return text.getvalue()
 
 
 def _tools() -> Iterator[str]:
@@ -87,16 +102,17 @@ def _tools() -> Iterator[str]:
 
 
 def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    there = [one for one in archives if one["outcome"] != "absent"]
-    running = [one for one in there if one["outcome"] == "runs"]
-    yield f"\n## Archives\n\n{len(running)} of {len(there)} run.\n"
-    yield f"| archive | rows | {' | '.join(TOOLS)} | messages |"
-    yield f"| --- | --: |{' --- |' * len(TOOLS)} --- |"
+    running = [one for one in archives if one["outcome"] == "runs"]
+    yield f"\n## Archives\n\n{len(running)} of {len(archives)} run."
+    yield "Deviations of those that other programs run:\n"
+    yield f"| archive | rows | {' | '.join(TOOLS)} |"
+    yield f"| --- | --: |{' --- |' * len(TOOLS)}"
     for one in running:
         tools = one.get("tools", {})
+        if all(isinstance(tools.get(tool, ""), str) for tool in TOOLS):
+            continue
         cells = (_compared(one, tool, tools.get(tool, "")) for tool in TOOLS)
-        yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} | {_said(one['said'])} |"
-    yield from _not_running("archive", there)
+        yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} |"
 
 
 def _said(lines: Sequence[str]) -> str:
@@ -108,7 +124,7 @@ def _said(lines: Sequence[str]) -> str:
 def _compared(one: Mapping[str, Any], tool: str, deviation: float | str) -> str:
     """What came of the comparison: a number, or why there is none."""
     if isinstance(deviation, str):
-        return "does not run it" if deviation else ""
+        return "not run" if deviation else ""
     if deviation <= SYSTEM_BOUND:
         return f"{deviation:.1e}"
     return f"{deviation:.1e}: {_explained(one, tool)}"
@@ -123,23 +139,20 @@ def _explained(one: Mapping[str, Any], tool: str) -> str:
     return why[0] if why else "**not explained**"
 
 
-def _not_running(what: str, files: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """The files that do not run, by their reasons."""
-    grouped: dict[str, list[Mapping[str, Any]]] = {reason: [] for reason in _REASONS}
-    for one in files:
-        if one["outcome"] != "runs":
-            found = (name for name, part in _REASONS.items() if re.search(part, one["reason"]))
-            grouped[next(found)].append(one)
-    counts = (f"- {len(members)} {reason}" for reason, members in grouped.items() if members)
-    yield "\nThe others do not run:\n\n" + "\n".join(counts)
-    yield f"\n| {what} | why |\n| --- | --- |"
-    for members in grouped.values():
-        for one in members:
-            yield f"| {_name(one)} | {_why(one)} |"
+def _not_running(*kinds: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """How many archives and FMUs do not run, by their reasons."""
+    counts = [Counter(_reason(one) for one in files if one["outcome"] != "runs") for files in kinds]
+    yield "\n## What does not run\n\n| reason | archives | FMUs |\n| --- | --: | --: |"
+    for reason in _REASONS:
+        if any(count[reason] for count in counts):
+            yield f"| {reason} | {' | '.join(str(count[reason]) for count in counts)} |"
 
 
-def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    there = [one for one in fmus if one["outcome"] != "absent"]
+def _reason(one: Mapping[str, Any]) -> str:
+    return next(name for name, part in _REASONS.items() if re.search(part, one["reason"]))
+
+
+def _fmus(there: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     running = [one for one in there if one["outcome"] == "runs"]
     numbers = [one["deviation"] for one in running if isinstance(one["deviation"], float)]
     yield f"\n## FMUs one by one\n\n{len(running)} of {len(there)} run{_versions(there)}.\n"
@@ -149,8 +162,7 @@ def _fmus(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     )
     for one in running:
         if isinstance(one["deviation"], float) and not one["deviation"] <= FMU_BOUND:
-            yield f"- {_name(one)} deviates by {one['deviation']:.1e}: {_explained(one, _HOST)}.\n"
-    yield from _not_running("FMU", there)
+            yield f"- {_name(one)} deviates by {one['deviation']:.1e}: {_explained(one, _HOST)}."
 
 
 def _versions(fmus: Sequence[Mapping[str, Any]]) -> str:
@@ -195,28 +207,6 @@ def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         deviation = one["changed"].get("deviation")
         if isinstance(deviation, float) and not deviation <= FMU_BOUND:
             yield f"- {_name(one)} deviates by {deviation:.1e}: {_explained(one, _HOST)}."
-    for one in lost:
-        yield f"- {_name(one)} does not take {_listed(one['changed']['lost'])}."
-    for one in changed:
-        if one not in ran:
-            yield f"- {_name(one)}: {_why(one['changed'])}"
-
-
-def _listed(names: Sequence[str], most: int = 5) -> str:
-    shown = ", ".join(f"`{name}`" for name in names[:most])
-    return shown + (f" and {len(names) - most} more" if len(names) > most else "")
-
-
-def _absent(found: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """What could not be fetched where this page was written."""
-    places = Counter(one["place"] for one in found if one["outcome"] == "absent")
-    if places:
-        yield "\n## Unavailable files\n"
-        yield "Files that could not be fetched when this page was written:\n"
-        for one in found:
-            if one["outcome"] == "absent":
-                yield f"- {_name(one)}"
-    yield ""
 
 
 def _name(one: Mapping[str, Any]) -> str:

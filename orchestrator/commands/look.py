@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
@@ -18,18 +18,25 @@ from orchestrator.commands.options import (
 )
 from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.cosim.observers.observer import Observer, Progress
-from orchestrator.figures.animation import FRAMES_PER_SECOND, animate, check_film
 from orchestrator.figures.drawing import save
+from orchestrator.figures.film import Film, animate
 from orchestrator.figures.plot import plot, told_apart, wanted_columns
 from orchestrator.figures.style import Drawn
-from orchestrator.figures.view import view_page
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Files, Request
-from orchestrator.runs.result import changed_files, read_record, read_result, table_in
-from orchestrator.vehicle.signals import loops_of
+from orchestrator.runs.result import (
+    METRICS,
+    changed_files,
+    companion_tables,
+    read_metrics,
+    read_record,
+    read_result,
+    table_in,
+)
+from orchestrator.vehicle.signals import Loop, loops_of
 
 #: The scenario that a live page opens unless another is named.
 _OPENED = "fig4"
@@ -100,15 +107,29 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
     add_system(parser)
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
+    fps, (width, height), _ = film = Film()
     parser.add_argument(
-        "--fps",
-        type=int,
-        default=FRAMES_PER_SECOND,
-        metavar="N",
-        help=f"number of frames per second; default: {FRAMES_PER_SECOND}",
-    )
+        "--fps", type=int, default=fps, metavar="N",
+        help=f"number of frames per second; default: {fps}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--size", type=_size, default=film.size, metavar="WIDTHxHEIGHT",
+        help=f"size of the picture in pixels; default: {width}x{height}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--speed", type=float, metavar="X",
+        help="seconds of the run in a second of the film; default: the film lasts 10 s",
+    )  # fmt: skip
     _add_file(parser, "film to write: .gif or .mp4; default: results/SCENARIO.gif")
     parser.set_defaults(action=_animate)
+
+
+def _size(text: str) -> tuple[int, int]:
+    """Width and height, with an x between them."""
+    width, _, height = text.partition("x")
+    if not (width.isdecimal() and height.isdecimal()):
+        raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT")
+    return int(width), int(height)
 
 
 def _add_file(parser: argparse.ArgumentParser, text: str, default: Path | None = None) -> None:
@@ -159,19 +180,29 @@ def _is_there(text: str) -> bool:
 
 
 def _view(options: argparse.Namespace) -> int:
+    # Only this command needs it.
+    from orchestrator.live.view import Stored, view_page  # noqa: PLC0415
+
     file = table_in(options.result)
     out = options.out or file.with_name(VIEW)
     if out.suffix != ".html":
         raise InputError(f"{out}: must end with .html")
-    _warn(file)
-    run = read_result(file)
+    files = [file, *companion_tables(file)[:1]]
+    for one in files:
+        _warn(one)
+    runs = told_apart([read_result(one, _viewed) for one in files], files)
     record = read_record(file)
-    title = str(record.get("title") or run.label)
-    # A title may name all compared runs; the page shows one.
-    if label := record.get("label"):
+    title = str(record.get("title") or runs[0].label)
+    # A title may name all runs that a scenario compares.
+    if (label := record.get("label")) and len(files) == 1:
         title += f" (shown: {label})"
+    indices = [one.with_name(METRICS) for one in files]
+    stored = [
+        Stored(run, read_metrics(path) if path.is_file() else {})
+        for run, path in zip(runs, indices, strict=True)
+    ]
     try:
-        text = view_page(title, run)
+        text = view_page(title, stored, say)
     except InputError as error:
         raise InputError(f"{options.result}: {error}") from error
     with _written(out, options.force) as folder:
@@ -179,9 +210,15 @@ def _view(options: argparse.Namespace) -> int:
     return OK
 
 
+def _viewed(columns: Sequence[str], loops: Sequence[Loop]) -> Collection[str]:
+    """The columns whose extremes are kept: of vehicles what is drawn, or all."""
+    drawn = {name for loop in loops for name in loop.drawn()}
+    return drawn if drawn.intersection(columns) else columns
+
+
 def _live(options: argparse.Namespace) -> int:
     # Only this command needs them.
-    from orchestrator.live.assembly import live_page  # noqa: PLC0415
+    from orchestrator.live.presets import live_page  # noqa: PLC0415
 
     out = options.out or Path(f"{Path(options.scenario).stem}-live.html")
     if out.suffix != ".html":
@@ -195,7 +232,8 @@ def _live(options: argparse.Namespace) -> int:
 def _animate(options: argparse.Namespace) -> int:
     scenario, system = read_system(options)
     out = options.out or Path("results", f"{scenario.stem}.gif")
-    check_film(out, options.fps)
+    film = Film(options.fps, options.size, options.speed)
+    film.check(out)
     prepared = prepare(scenario, system, request(options))
     loops = loops_of(prepared.system)
     seen = VisibleRows({name for loop in loops for name in loop.drawn()})
@@ -206,7 +244,7 @@ def _animate(options: argparse.Namespace) -> int:
         for loop in loops:
             if missing := seen.missing(*loop.for_control_point()):
                 raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-        animate(scenario.title or scenario.name, run, folder / out.name, options.fps)
+        animate(scenario.title or scenario.name, run, folder / out.name, film)
     return status(scenario.name, ending)
 
 

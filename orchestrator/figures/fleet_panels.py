@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import cycle
 from typing import Any
 
 import numpy as np
 
 from orchestrator.figures.panels import Cell, Panel, frame_path, over_time, title
-from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, earth_axes
-from orchestrator.vehicle.distances import distances, for_distances, size, smallest_distances
+from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, earth_axes, vehicle_colours
+from orchestrator.vehicle.distances import (
+    SMALLEST_DISTANCE_LABEL,
+    distances,
+    for_distances,
+    size,
+    smallest_distances,
+)
 from orchestrator.vehicle.signals import Loop, tracking_error, true_control_point
 
 #: Instants at which the vehicles are joined by lines.
@@ -28,7 +33,7 @@ _RUN_STYLES: tuple[dict[str, Any], ...] = (
 
 def _loops(run: Drawn, needs: Any) -> Iterator[tuple[Loop, str]]:
     """The vehicles that have what is needed, each with its colour."""
-    for loop, colour in zip(run.loops, cycle(COLOURS), strict=False):
+    for loop, colour in zip(run.loops, vehicle_colours(len(run.loops)), strict=True):
         if not run.result.missing(*needs(loop)):
             yield loop, colour
 
@@ -105,6 +110,15 @@ def _distances(cell: Cell, runs: Sequence[Drawn]) -> None:
     over_time([axes], runs)
 
 
+def _smallest_distance(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """Smallest distance between two of all vehicles."""
+    axes, table = cell.axes(ylabel="distance [m]"), runs[0].result
+    axes.plot(table.time, smallest_distances(table, runs[0].loops), color=REFERENCE)
+    axes.set_ylim(bottom=0.0)
+    title(axes, SMALLEST_DISTANCE_LABEL)
+    over_time([axes], runs)
+
+
 def _named(what: str, runs: Sequence[Drawn]) -> str:
     return f"{what}, {runs[1].label} dashed" if len(runs) > 1 else what
 
@@ -113,3 +127,6 @@ PATHS = Panel("paths", Loop.for_control_point, _paths, 3.6, of_one=True)
 FROM_ABOVE = Panel("paths from above", Loop.for_control_point, _from_above, 3.6, of_one=True)
 ERRORS = Panel("sizes of errors", Loop.for_tracking, _errors, 3.0, of_one=True)
 DISTANCES = Panel("distances", lambda loop: for_distances([loop]), _distances, 3.0, of_one=True)
+SMALLEST_DISTANCE = Panel(
+    "smallest distance", lambda loop: for_distances([loop]), _smallest_distance, of_one=True
+)

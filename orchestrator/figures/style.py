@@ -21,6 +21,12 @@ REFERENCE = "#555555"
 #: Hues of more vehicles than there are colours: their lightnesses in turn, and their saturation.
 _LIGHTNESSES, _SATURATION = (0.32, 0.6), 0.75
 
+#: The hull of a vehicle, in shares of its length: distance behind the nose and radius of its rings.
+RINGS = ((0, 0), (0.02, 0.04), (0.08, 0.075), (0.18, 0.09), (0.7, 0.09), (0.9, 0.05), (1, 0.02))
+
+#: Corners of the upper fin: distance behind the nose, and height above the axis.
+FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
+
 #: Width of the page [in]: two columns of a journal, and a phone still shows its letters.
 FIGURE_WIDTH = 7.2
 

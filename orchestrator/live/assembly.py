@@ -1,6 +1,6 @@
-"""One page in which a loop runs: script, modules and data in one file that needs no other.
+"""Pages in one file that needs no other: script, style, data, and modules or rows.
 
-Script and style are bundled by esbuild, which npm installs, and cached like the module.
+Script and style are bundled by esbuild, which npm installs, and cached like the modules.
 """
 
 from __future__ import annotations
@@ -12,29 +12,40 @@ import re
 import shutil
 import subprocess
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
+from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.discovery import licences
 from fmus.kinds import NATIVE
-from orchestrator.live.module import LICENCES as MODULE_LICENCES
-from orchestrator.live.module import MODULE, live_module
-from orchestrator.live.presets import page_data
+from orchestrator.figures.style import FIN, RINGS, printed_unit
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, last_line, reason
+from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
+from orchestrator.vehicle.indices import metrics
+from orchestrator.vehicle.signals import Loop
+
+Plain = dict[str, Any]
 
 #: Category in the cache.
 CATEGORY = "live-script"
 
-#: The page's script and style, the engine for Node.js, and the licences of packages in them.
-SCRIPT, STYLE, ENGINE, LICENCES = FILES = "page.js", "page.css", "engine.mjs", "licences.txt"
+#: Scripts of the page of a loop and of stored runs, by the kinds of pages.
+SCRIPTS = {"live": "live.js", "view": "view.js"}
+
+#: The style of all pages, the engine for Node.js, and the licences of packages in them.
+STYLE, ENGINE, LICENCES = "page.css", "engine.mjs", "licences.txt"
+FILES = (*SCRIPTS.values(), STYLE, ENGINE, LICENCES)
 
 WEB = Path(__file__).with_name("web")
 
-#: The page, with `{{NAME}}` in the place of each part.
+#: The page, with `{{NAME}}` in the place of each part, and what only pages of one kind have between
+#: `<!--KIND-->` and `<!--/KIND-->`.
 _PAGE = WEB / "page.html"
 
 #: Sources that decide the bundle.
@@ -43,6 +54,9 @@ _SOURCES = ("package.json", "package-lock.json", ".npmrc", "build.mjs", "src")
 #: Options of `npm ci`. The packages bring programs for each machine: none needs a script. Without a
 #: network, npm's own two retries would take more than a minute.
 _OPTIONS = ("--omit=dev", "--ignore-scripts", "--prefer-offline", "--fetch-retries=1")
+
+#: Groups of signals that have charts, with the units of their members.
+_CHARTS = {"e": POSITION, "tau": TAU, "dy": VELOCITY, "theta_hat": THETA}
 
 #: A line in which npm, esbuild or Node.js says what is wrong, not only that something is.
 _COMPLAINT = re.compile(
@@ -53,36 +67,72 @@ _COMPLAINT = re.compile(
 _LIMIT = 600.0
 
 
-def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> str:
-    """The page.
+def assemble(
+    kind: str,
+    data: Mapping[str, Any],
+    binary: Sequence[bytes],
+    fields: Mapping[str, str],
+    hear: Callable[[str], None] = lambda line: None,
+) -> str:
+    """Put a page together.
 
     Args:
-        opened: the scenario that it shows first.
+        kind: of :data:`SCRIPTS`.
+        data: for the script, beside what all pages hold.
+        binary: modules or rows.
+        fields: texts of the page by their names, not escaped.
         hear: called with a line before a part is made, which may take minutes.
 
     Raises:
-        InputError: there is no such scenario, the page cannot run it, or a part cannot be made.
+        InputError: a part cannot be made.
 
     """
-    data, programs = page_data(opened)
     parts = {name: path.read_text(encoding="utf-8") for name, path in live_script(hear).items()}
-    modules = [live_module(one.sources, hear) for one in programs]
-    linked = modules[0][MODULE_LICENCES].read_text(encoding="utf-8")
-    titles = {one["name"]: one["title"] for one in data["presets"]}
-    fields = {
-        "title": html.escape(titles[data["opened"]]),
+    script = parts[SCRIPTS[kind]]
+    content = json.dumps({**_common(), **data}, separators=(",", ":"), allow_nan=False)
+    texts = (licences(NATIVE), fields.get("licences"), parts[LICENCES])
+    filled = {
+        "kind": kind,
+        **{name: html.escape(text) for name, text in fields.items()},
+        "licences": html.escape("\n\n".join(filter(None, texts))),
         "style": parts[STYLE],
         "style-hash": hash_source(parts[STYLE]),
-        "script": parts[SCRIPT],
-        "script-hash": hash_source(parts[SCRIPT]),
-        "licences": html.escape("\n\n".join((licences(NATIVE), linked, parts[LICENCES]))),
-        "data": packed(json.dumps(data, separators=(",", ":"), allow_nan=False).encode()),
-        "modules": " ".join(packed(module[MODULE].read_bytes()) for module in modules),
+        "script": script,
+        "script-hash": hash_source(script),
+        "data": packed(content.encode()),
+        "binary": " ".join(map(packed, binary)),
     }
-    before, *rest = _PAGE.read_text(encoding="utf-8").split("{{")
+    others = "|".join(SCRIPTS.keys() - {kind})
+    page = _PAGE.read_text(encoding="utf-8")
+    page = re.sub(rf"<!--({others})-->.*?<!--/\1-->", "", page, flags=re.DOTALL)
+    before, *rest = re.sub(rf"<!--/?{kind}-->", "", page).split("{{")
     return before + "".join(
-        fields[name] + text for name, _, text in (part.partition("}}") for part in rest)
+        filled[name] + text for name, _, text in (part.partition("}}") for part in rest)
     )
+
+
+def _common() -> Plain:
+    """What the script of every page reads, by the names of `web/src/types.ts`."""
+    indices = [(one.name, one.label, one.meaning, one.units) for one in metrics()]
+    meaning = "smallest distance between the centres of mass of any two vehicles"
+    indices.append((SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL, meaning, {"": "m"}))
+    return {
+        "units": {group: _printed(units) for group, units in _CHARTS.items()},
+        "indices": [
+            {"name": name, "label": label, "meaning": meaning, "units": _printed(units)}
+            for name, label, meaning, units in indices
+        ],
+        "hull": {"rings": RINGS, "fin": FIN},
+    }
+
+
+def vehicle_data(loop: Loop) -> dict[str, str]:
+    """The components of a vehicle by their roles."""
+    return {"name": loop.name, "allocation": "", **asdict(loop)}
+
+
+def _printed(units: Mapping[Any, str]) -> dict[str, str]:
+    return {str(member): printed_unit(unit) for member, unit in units.items()}
 
 
 def hash_source(text: str) -> str:
@@ -108,7 +158,7 @@ def live_script(hear: Callable[[str], None] = lambda line: None) -> dict[str, Pa
     try:
         return made_once(CATEGORY, key_of(), lambda: bundled(hear))
     except OSError as error:
-        raise InputError(f"the script of the live page cannot be built: {reason(error)}") from error
+        raise InputError(f"the script of the page cannot be built: {reason(error)}") from error
 
 
 def key_of() -> str:
@@ -140,8 +190,7 @@ def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]
     npm = shutil.which("npm")
     if npm is None or shutil.which("node") is None:
         raise InputError(
-            "the live page needs Node.js 20 or later with npm to bundle its script: "
-            "https://nodejs.org"
+            "the page needs Node.js 20 or later with npm to bundle its script: https://nodejs.org"
         )
     hear("bundling the script of the page with npm (only once): this may take a minute")
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
@@ -166,6 +215,4 @@ def _run(folder: Path, *command: str) -> None:
     if process.returncode != 0:
         complaints = [line for line in process.stderr.splitlines() if _COMPLAINT.match(line)]
         said = (complaints or [last_line(process.stderr)])[0]
-        raise InputError(
-            f"the script of the live page cannot be built: {' '.join(command[:2])}: {said}"
-        )
+        raise InputError(f"the script of the page cannot be built: {' '.join(command[:2])}: {said}")

@@ -1,4 +1,4 @@
-"""What the page of a loop holds as plain data: scenarios beside their comparisons, and events.
+"""The page in which a loop runs: scenarios beside their comparisons, and events, as plain data.
 
 Names and meanings are the ones of `web/src/types.ts`. What a plan decides is decided here: which
 program makes its steps, which parameters a comparison shares, and to which inputs an event gets.
@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
 from fmus.kinds import NATIVE
 from orchestrator.cosim.hooks.events import (
     Action,
@@ -31,6 +30,8 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.values import Value
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
+from orchestrator.live.assembly import Plain, assemble, vehicle_data
+from orchestrator.live.module import LICENCES, MODULE, live_module
 from orchestrator.live.programs import REDUCERS, Programs
 from orchestrator.machine.errors import InputError
 from orchestrator.program.reducing import looking_at
@@ -40,8 +41,6 @@ from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario, names, read_events, read_scenario, shared_events
 from orchestrator.runs.scenario_file import AT_ONCE
-from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
-from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
@@ -61,16 +60,11 @@ class _Controller(NamedTuple):
     allocated: str
 
 
-Plain = dict[str, Any]
-
 #: In the order in which they are drawn.
 _CONTROLLERS = {
     "ObserverController": _Controller("proposed", "path-pd", "remus-pd"),
     "PdController": _Controller("PD", "path", "remus"),
 }
-
-#: Groups of signals that have charts, with the units of their members.
-_CHARTS = {"e": POSITION, "tau": TAU, "dy": VELOCITY, "theta_hat": THETA}
 
 #: The page keeps all rows of a run in its memory, and refuses more steps of all vehicles together.
 _MOST_STEPS = 200_000
@@ -78,13 +72,26 @@ _MOST_STEPS = 200_000
 #: Paths of more are hard to tell apart.
 _MOST_VEHICLES = 10
 
-#: What there is of several vehicles together.
-_TOGETHER: Plain = {
-    "name": SMALLEST_DISTANCE,
-    "label": SMALLEST_DISTANCE_LABEL,
-    "meaning": "smallest distance between the centres of mass of any two vehicles",
-    "units": {"": "m"},
-}
+
+def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> str:
+    """The page.
+
+    Args:
+        opened: the scenario that it shows first.
+        hear: called with a line before a part is made, which may take minutes.
+
+    Raises:
+        InputError: there is no such scenario, the page cannot run it, or a part cannot be made.
+
+    """
+    data, programs = page_data(opened)
+    modules = [live_module(one.sources, hear) for one in programs]
+    linked = modules[0][LICENCES].read_text(encoding="utf-8")
+    titles = {one["name"]: one["title"] for one in data["presets"]}
+    binary = [module[MODULE].read_bytes() for module in modules]
+    return assemble(
+        "live", data, binary, {"title": titles[data["opened"]], "licences": linked}, hear
+    )
 
 
 def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
@@ -111,14 +118,7 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
     data = {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
-        "units": {group: _printed(units) for group, units in _CHARTS.items()},
         "presets": presets,
-        "indices": [
-            {"name": one.name, "label": one.label, "meaning": one.meaning}
-            | {"units": _printed(one.units)}
-            for one in metrics()
-        ]
-        + [_TOGETHER],
         "measured": measured,
     }
     return data, modules
@@ -133,10 +133,6 @@ def bundled() -> Programs:
 @cache
 def _bundled_runs() -> Mapping[str, list[Prepared]]:
     return {name: runs_of(name) for name in names()}
-
-
-def _printed(units: Mapping[Any, str]) -> dict[str, str]:
-    return {str(member): printed_unit(unit) for member, unit in units.items()}
 
 
 def preset(name: str) -> tuple[Plain, Sequence[Programs]]:
@@ -272,7 +268,7 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
     module, number, text = program
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
-        "vehicles": list(map(_vehicle, prepared.loops)),
+        "vehicles": list(map(vehicle_data, prepared.loops)),
         "measured": [_measured(text, one) for one in prepared.loops],
         "components": {name: _type(part) for name, part in system.components.items()},
         "head": {
@@ -290,10 +286,6 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
         **({"fixedStep": plan.experiment.step} if text.slow else {}),
         "events": _events(prepared, owner),
     }
-
-
-def _vehicle(loop: Loop) -> dict[str, str]:
-    return {"name": loop.name, "allocation": "", **asdict(loop)}
 
 
 def _measured(text: Text, loop: Loop) -> list[Plain]:

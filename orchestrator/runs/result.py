@@ -597,6 +597,14 @@ def table_in(path: Path) -> Path:
     raise InputError(f"{path}: holds no result.csv or result.parquet")
 
 
+def companion_tables(table: Path) -> list[Path]:
+    """The tables of the runs that a result is compared with, in folders below its own."""
+    names = (Path(str(name)) for name in read_record(table).get("files", ()))
+    below = (name for name in names if len(name.parts) == 2 and name.name in TABLES)
+    found = (table.parent / name for name in below if name.parent.name not in ("", ".."))
+    return [file for file in found if file.is_file() and not file.parent.is_symlink()]
+
+
 def changed_files(table: Path) -> list[Path]:
     """The table of a result and its record, if they were changed since the run wrote them."""
     return [file for file in (table, table.with_name(RECORD)) if is_changed(file)]

@@ -32,7 +32,8 @@ TESTS = (
     "tests/unit/fmus/native/test_translator.py",
 )
 READ = (
-    "tests/support", "tests/fuzz", "docs/reference/fmi-answers.md", "pyproject.toml",
+    "tests/support", "tests/fuzz", "docs/reference/fmi-answers.md",
+    "docs/reference/fmi-answers.csv", "pyproject.toml",
     "CITATION.cff", *TESTS,
 )  # fmt: skip
 

@@ -27,9 +27,9 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
 from functools import partial
-from importlib.util import find_spec
 from pathlib import Path
 from random import Random
+from shutil import which
 from types import FrameType
 from typing import Any, NamedTuple
 from unittest.mock import patch
@@ -99,7 +99,7 @@ class Kind:
 
 
 def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
-    """All kinds of files, each with a valid one; some need plotly."""
+    """All kinds of files, each with a valid one; some need npm."""
     fmus = {
         # Descriptions need no code; a system of such FMUs can be read and written, not run.
         fmu.name: _zipped({"modelDescription.xml": _entries(fmu.read_bytes())[_DESCRIPTION]})
@@ -158,10 +158,13 @@ def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
         "plot": Kind(stored["result.csv"], mutators.table, beside_the_others("result.csv", *_PLOT)),
         "view": Kind(stored["result.csv"], mutators.table, beside_the_others("result.csv", *_VIEW)),
         "record": Kind(stored["run.json"], mutators.json, beside_the_others("run.json", *_VIEW)),
+        "indices": Kind(
+            stored["metrics.json"], mutators.json, beside_the_others("metrics.json", *_VIEW)
+        ),
         "table": _table(runs, columns),
     }
-    if find_spec("plotly") is None:
-        del found["view"], found["record"]
+    if which("npm") is None:
+        del found["view"], found["record"], found["indices"]
     return found
 
 

@@ -18,7 +18,7 @@ TABLES = 200
 
 NAMES = (
     "description", "ssd", "scenario", "record", "table", "fmu", "ssv", "ssp", "plot", "view",
-    "description3", "ssd2", "ssv2",
+    "indices", "description3", "ssd2", "ssv2",
 )  # fmt: skip
 
 
@@ -31,7 +31,7 @@ def kinds() -> Iterator[dict[str, files.Kind]]:
 @pytest.mark.parametrize("name", [*NAMES[:5], *slow(*NAMES[5:])])
 def test_mutated_files_are_taken_or_refused_in_one_line(kinds, name: str):
     if name not in kinds:
-        pytest.skip("needs the extra `view`")
+        pytest.skip("npm is not installed")
     for seed in range(TABLES if name == "table" else RUNS):
         content = kinds[name].mutate(kinds[name].valid, Random(f"{name} {seed}"))
         try:
@@ -41,4 +41,4 @@ def test_mutated_files_are_taken_or_refused_in_one_line(kinds, name: str):
 
 
 def test_all_kinds_are_tried(kinds):
-    assert {*kinds} | {"view", "record"} == {*NAMES}
+    assert {*kinds} | {"view", "record", "indices"} == {*NAMES}

@@ -38,7 +38,7 @@ ALLOWED = {
     "fmus": {"auv_fmu", "markdown_it", "orchestrator", "pythonfmu"},
     "orchestrator": {
         "auv_fmu", "dask", "distributed", "fmpy", "fmus", "libcosimpy", "lxml", "markdown_it",
-        "matplotlib", "numpy", "onnx", "pandas", "PIL", "platformdirs", "pyarrow",
+        "matplotlib", "mpl_toolkits", "numpy", "onnx", "pandas", "PIL", "platformdirs", "pyarrow",
         "pydantic", "pydantic_core", "scipy", "tqdm",
     },
 }  # fmt: skip

@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-GLOSSARY = (ROOT / "docs" / "reference" / "glossary.md").read_text(encoding="utf-8")
-TERMS = re.findall(r"^\| (.+?) \| (.+?) \| `([\w./-]+)`(?: `(\w+)`)? \|$", GLOSSARY, re.MULTILINE)
+GLOSSARY = (ROOT / "docs" / "contributing" / "glossary.md").read_text(encoding="utf-8")
+TERMS = re.findall(r"^\| (.+?) \| (.*?)\| `([\w./-]+)`(?: `(\w+)`)? \|$", GLOSSARY, re.MULTILINE)
+USERS = (ROOT / "docs" / "reference" / "glossary.md").read_text(encoding="utf-8")
 RETIRED = re.findall(r"^\| `(\w+)` \| .+ \|$", GLOSSARY, re.MULTILINE)
 
 
@@ -25,6 +26,9 @@ def test_terms_are_told_once_and_in_order():
     names = [term.casefold() for term, *_ in TERMS]
     assert len(names) >= 40
     assert names == sorted(set(names))
+    told = re.findall(r"^\| (.+?) \| .+ \|$", USERS, re.MULTILINE)[1:]
+    assert told == sorted(set(told), key=str.casefold)
+    assert {term for term, meaning, *_ in TERMS if not meaning} <= {*told}
 
 
 @pytest.mark.parametrize(("place", "name"), [term[2:] for term in TERMS], ids=str)

@@ -1,8 +1,11 @@
-"""docs/reference/fmi-answers.md, read: what an FMU answers to each call in each state."""
+"""fmi-answers.md and fmi-answers.csv of docs/reference: what an FMU answers to each call."""
 
 from __future__ import annotations
 
+import csv
+from collections.abc import Iterator
 from functools import cache
+from itertools import product
 from typing import NamedTuple
 
 from fmus.kinds import NATIVE, PYTHON
@@ -18,7 +21,8 @@ STATES = (*MODES, ERROR)
 #: Rows that are about no instance: the function that makes one, and what stands in its place.
 CREATION, WITHOUT_AN_INSTANCE = "fmi2Instantiate", "no instance"
 
-_NOT_POSSIBLE = "\u2013"
+#: What stands for a name with fmi3 in it.
+SAME_NAME = "the same"
 
 _UNSOUND = ("NULL", "n = ", "not UTF-8", "freed", "pointer", "too few", "too many")
 
@@ -84,13 +88,18 @@ def answers() -> dict[str, Answer]:
     return {line[0]: Answer(*line) for line in _sections()["Answers"].rows}
 
 
+def _keys(functions: str, cases: str) -> Iterator[tuple[str, str]]:
+    """Each function and each case of a line."""
+    return product(functions.split(", "), cases.split("; "))
+
+
 @cache
 def rows() -> dict[tuple[str, str], Row]:
     """All calls on an instance, by function and case."""
     found: dict[tuple[str, str], Row] = {}
-    for section in _sections().values():
-        if section.header[2:] == [*STATES]:
-            for function, case, *cells in section.rows:
+    with PAGE.with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+        for function, case, *cells in csv.reader(file):
+            if function.startswith("fmi2"):
                 row = Row(function, case, _cells(dict(zip(STATES, cells, strict=True))))
                 assert row.key not in found, f"{row} stands twice"
                 found[row.key] = row
@@ -98,7 +107,7 @@ def rows() -> dict[tuple[str, str], Row]:
 
 
 def _cells(texts: dict[str, str]) -> dict[str, Cell]:
-    return {state: _cell(text, state) for state, text in texts.items() if text != _NOT_POSSIBLE}
+    return {state: _cell(text, state) for state, text in texts.items() if text}
 
 
 def _cell(text: str, state: str) -> Cell:
@@ -109,23 +118,23 @@ def _cell(text: str, state: str) -> Cell:
 
 def creations(kind: str = PYTHON) -> dict[str, bool]:
     """Whether fmi2Instantiate gives an instance, by what it is called with."""
-    rows = [*_sections()["Creating an instance"].rows]
+    found = _creations("Creating an instance")
     if kind == NATIVE:
-        others = _sections()["The FMUs in C"].rows
-        assert {case for case, _ in others} <= {case for case, _ in rows}
-        rows += others
-    return {case: answer == "instance" for case, answer in rows}
+        others = _creations("The FMUs in C")
+        assert others.keys() <= found.keys()
+        found |= others
+    return found
+
+
+def _creations(heading: str) -> dict[str, bool]:
+    rows = _sections()[heading].rows
+    return {case: answer == "instance" for answer, cases in rows for case in cases.split("; ")}
 
 
 def without_an_instance() -> dict[str, str]:
     """The status of any call, by what stands in the place of an instance."""
-    return dict(_sections()["No instance"].rows)
-
-
-def without_the_loader() -> dict[tuple[str, str], str]:
-    """What becomes of calls on FMUs without the native loader, by function and case."""
-    rows = _sections()["Without the native loader"].rows
-    return {(function, case): answer for function, case, answer in rows}
+    rows = _sections()["No instance"].rows
+    return {what: answer for places, answer in rows for what in places.split("; ")}
 
 
 def _tables_of_fmi3() -> list[Section]:
@@ -136,11 +145,15 @@ def _tables_of_fmi3() -> list[Section]:
 def names_in_fmi3() -> dict[str, str]:
     """The functions of FMI 3.0 that answer as functions of FMI 2.0 do, by the names of these."""
     names, _ = _tables_of_fmi3()
-    return dict(names.rows)
+    return {
+        function: function.replace("fmi2", "fmi3") if name == SAME_NAME else name
+        for functions, name in names.rows
+        for function in functions.split(", ")
+    }
 
 
 @cache
 def fmi3_rows() -> dict[tuple[str, str], str]:
     """What only FMI 3.0 has: the answers, by function and case."""
     _, own = _tables_of_fmi3()
-    return {(function, case): answer for function, case, answer in own.rows}
+    return {key: answer for functions, cases, answer in own.rows for key in _keys(functions, cases)}

@@ -19,9 +19,9 @@ from orchestrator.commands.main import main
 from orchestrator.cosim.observers.observer import Ending
 from orchestrator.cosim.observers.table import Table
 from orchestrator.live import assembly, module, presets
-from orchestrator.live.assembly import ENGINE, live_page
+from orchestrator.live.assembly import ENGINE
 from orchestrator.live.module import live_module
-from orchestrator.live.presets import page_data, preset, runs_of
+from orchestrator.live.presets import live_page, page_data, preset, runs_of
 from orchestrator.machine.compilers import FLAGS, machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.runs import bundle

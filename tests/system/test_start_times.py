@@ -34,6 +34,8 @@ from orchestrator.runs.result import read_result
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.studies.study_result import StudyResult
 from support import linear, relay, typed
+from support.live import needs_npm
+from support.pages import stored
 from support.runs import run_table
 from support.texts import mentions
 from support.tiers import slow
@@ -322,23 +324,23 @@ def test_figures_show_the_same_at_other_times(folders, start):
     assert sum(axes.get_xlim()[0] == start for axes in panels) > 5
 
 
+@needs_npm
+@pytest.mark.usefixtures("script")
 @pytest.mark.parametrize("start", STARTS)
-def test_pages_and_films_show_the_same_at_other_times(folders, start, tmp_path):
-    pytest.importorskip("plotly", reason="needs the extra `view`")
-
-    def page(start: float) -> dict[str, Any]:
+def test_pages_show_the_same_at_other_times(folders, start, tmp_path):
+    def page(start: float) -> tuple[Any, dict[str, Any]]:
         out = tmp_path / f"{start:g}.html"
         assert main(["view", str(folders("vehicle", start) / "run"), "--out", str(out)]) == 0
-        [data] = re.findall(r'<script id="data"[^>]*>(.*)</script>', out.read_text())
-        return dict(json.loads(data))
+        data, [columns] = stored(out.read_text(encoding="utf-8"))
+        return data, columns
 
-    one, other = page(start), page(0.0)
-    times = np.array(one["frames"].pop("time")) - start
-    assert times == pytest.approx(np.array(other["frames"].pop("time")), abs=1e-3)
-    assert one["frames"] == other["frames"]
-    for trace, before in zip(one["series"]["traces"], other["series"]["traces"], strict=True):
-        assert trace["y"] == before["y"]
-        assert np.array(trace["x"]) - start == pytest.approx(np.array(before["x"]), abs=1e-3)
+    (one, columns), (other, before) = page(start), page(0.0)
+    assert (columns.pop("time") - start).tolist() == before.pop("time").tolist()
+    assert {name: values.tolist() for name, values in columns.items()} == {
+        name: values.tolist() for name, values in before.items()
+    }
+    times = [[event["time"] for event in data["loops"][0]["happened"]] for data in (one, other)]
+    assert times[0] == [time + start for time in times[1]]
 
 
 @pytest.mark.parametrize("start", STARTS)

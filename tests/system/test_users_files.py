@@ -12,6 +12,7 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.tables import read_rows
+from support.live import needs_npm
 from support.machine import contents
 from support.texts import mentions
 
@@ -67,9 +68,10 @@ def test_a_companion_of_any_name_has_a_folder_of_its_own(stem):
         assert np.array_equal(rows(path), made.rows)
 
 
+@needs_npm
+@pytest.mark.usefixtures("script")
 def test_somebody_elses_result_is_read_and_no_more(capsys):
     """It brings hidden folders, links, and a record that names the user's files."""
-    pytest.importorskip("plotly", reason="needs the extra `view`")
     assert main(RUN) == 0
     for path in Path("r").glob(".*"):
         path.unlink()

@@ -17,6 +17,8 @@ from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
 from orchestrator.vehicle.proof import certificates, gain_check
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
+from support.live import needs_npm
+from support.pages import stored
 
 OTHER = Loop("tow", "pilot", "guide", "sea")
 STOP = "6"
@@ -126,13 +128,14 @@ def test_each_vehicle_is_drawn(results):
     )
 
 
+@needs_npm
+@pytest.mark.usefixtures("script")
 def test_all_vehicles_are_on_one_page(results, capsys):
-    pytest.importorskip("plotly", reason="needs the extra `view`")
     assert main(["view", str(results / "two")]) == 0
     page = results / "two" / "view.html"
     assert capsys.readouterr().out.split() == [str(page)]
-    text = page.read_text(encoding="utf-8")
-    assert all(f'"{name}"' in text for name in ("plant", "tow"))
+    [loop] = stored(page.read_text(encoding="utf-8"))[0]["loops"]
+    assert [vehicle["name"] for vehicle in loop["vehicles"]] == ["plant", "tow"]
 
 
 def test_theorem_and_indices_are_said_of_each(results, capsys):

@@ -25,7 +25,7 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from nbclient import NotebookClient
 
-from orchestrator.live import assembly
+from orchestrator.live import presets
 from orchestrator.machine.errors import InputError
 
 ROOT = Path(__file__).parents[2]
@@ -87,8 +87,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     place = page.file.src_uri
     [boost] = [n for beginning, n in BOOSTS.items() if place.startswith(beginning)] or [1.0]
     page.meta["search"] = {"boost": boost}
-    if "/" not in place:
-        # Nothing stands beside these pages in the tree.
+    if place == "index.md":
+        # Nothing stands beside it in the tree.
         page.meta["hide"] = ["navigation"]
     markdown = linked(markdown, place, files)
     up = posixpath.relpath(LIVE, posixpath.dirname(place) or ".")
@@ -177,7 +177,7 @@ def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 def live_page() -> tuple[str, str]:
     """The live page and, where it cannot be made, why, as HTML."""
     try:
-        return assembly.live_page("fig4"), ""
+        return presets.live_page("fig4"), ""
     except InputError as error:
         log.info("no live page: %s", error)
         why = escape(str(error))

@@ -1,4 +1,5 @@
-// Bundles the page: `node build.mjs FOLDER` writes page.js, page.css, engine.mjs and licences.txt.
+// Bundles the page: `node build.mjs FOLDER` writes live.js, view.js, page.css, engine.mjs
+// and licences.txt.
 import { readdirSync, readFileSync, writeFileSync } from "node:fs";
 import { build } from "esbuild";
 
@@ -25,7 +26,8 @@ async function bundle(entry, outfile, options) {
 }
 
 const names = [
-  ...(await bundle("main.ts", "page.js", { format: "iife", minify: true })),
+  ...(await bundle("live.ts", "live.js", { format: "iife", minify: true })),
+  ...(await bundle("view.ts", "view.js", { format: "iife", minify: true })),
   ...(await bundle("style.css", "page.css", { minify: true })),
 ];
 await bundle("engine.ts", "engine.mjs", { format: "esm", platform: "node" });

@@ -1,51 +1,59 @@
-"""The page of benchmarks: its commands, and how a new measurement comes into it."""
+"""The benchmarks: their commands, how a new measurement is kept, and what the page quotes of it."""
 
 from __future__ import annotations
 
 import re
 import shlex
 
+import pytest
+
 import benchmarks_page
-from benchmarks_page import PAGE, ROOT, is_written
+from benchmarks_page import RESULTS, ROOT, command_of, is_written
+from support.markdown import DOCS
+
+PAGE = (DOCS / "reference" / "benchmarks.md").read_text(encoding="utf-8")
+SECTIONS = [section for section in PAGE.split("\n## ") if "/results/" in section]
 
 
-def test_every_part_of_the_page_has_a_command_that_is_there():
-    text = PAGE.read_text(encoding="utf-8")
-    places = benchmarks_page._PLACE.findall(text)
-    assert len(places) == text.count("<!-- filled:") > 10
-    for name, command in places:
-        assert (ROOT / shlex.split(command)[0]).is_file(), name
+def test_every_file_has_a_command_that_is_there_and_a_place_on_the_page():
+    files = sorted(RESULTS.glob("*.txt"))
+    assert len(files) > 10
+    for file in files:
+        assert (ROOT / shlex.split(command_of(file))[0]).is_file(), file.stem
+    assert sorted(re.findall(r"/results/(\w+)\.txt", PAGE)) == [file.stem for file in files]
 
 
-def test_a_measurement_takes_its_place(tmp_path, monkeypatch):
-    page, script = tmp_path / "page.md", tmp_path / "script.py"
+@pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.partition("\n")[0])
+def test_every_number_of_a_table_is_in_the_files_of_its_section(section: str):
+    names = re.findall(r"/results/(\w+)\.txt", section)
+    text = "".join((RESULTS / f"{name}.txt").read_text(encoding="utf-8") for name in names)
+    rows = [line for line in section.splitlines() if re.match(r"\|(?! `python|-)", line)]
+    measured = " ".join(cell for row in rows for cell in row.split("|")[2:])
+    assert rows
+    for number in re.findall(r"-?\d[\d,.]*", measured):
+        assert re.search(rf"(?<![\d.]){re.escape(number)}(?![\d.])", text), number
+
+
+def test_a_measurement_takes_its_place(tmp_path):
+    file, script = tmp_path / "first.txt", tmp_path / "script.py"
     script.write_text("import sys; print('1.5 us', sys.argv[1:])\n")
-    parts = [
-        f"<!-- filled: {name} -->\n`python {script} --n 3`, once:\n\n```text\n0\n```\n<!-- / -->"
-        for name in ("first", "second")
-    ]
-    page.write_text("\n\n".join(parts))
-    monkeypatch.setattr(benchmarks_page, "PAGE", page)
-    assert is_written("second", f"{script} --n 3")
-    first, second = page.read_text().split("\n\n<!--")
-    assert first == parts[0]
-    assert re.search(rf"`python {script} --n 3`, \d{{4}}-\d\d-\d\d, .+:\n", second)
-    assert "```text\n1.5 us ['--n', '3']\n```\n<!-- / -->" in second
-    assert is_written("second", f"{script} --n 4")
-    assert page.read_text().count("1.5 us") == 1
+    file.write_text(f"$ python {script} --n 3\nonce\n\n0\n")
+    assert is_written(file)
+    command, where, _, *output = file.read_text().splitlines()
+    assert command == f"$ python {script} --n 3"
+    assert re.fullmatch(r"\d{4}-\d\d-\d\d, .+", where)
+    assert output == ["1.5 us ['--n', '3']"]
 
 
 def test_a_script_that_fails_changes_nothing_and_others_run(tmp_path, monkeypatch, capsys):
-    page, bad, good = (tmp_path / name for name in ("page.md", "bad.py", "good.py"))
+    bad, good = (tmp_path / name for name in ("bad.py", "good.py"))
     bad.write_text("print('1.5 us'); raise SystemExit(3)\n")
     good.write_text("print('2.5 us')\n")
-    parts = [
-        f"<!-- filled: {script.stem} -->\n`python {script}`, once:\n\n```text\n0\n```\n<!-- / -->\n"
-        for script in (bad, good)
-    ]
-    page.write_text("".join(parts))
-    monkeypatch.setattr(benchmarks_page, "PAGE", page)
+    for script in (bad, good):
+        script.with_suffix(".txt").write_text(f"$ python {script}\nonce\n\n0\n")
+    monkeypatch.setattr(benchmarks_page, "RESULTS", tmp_path)
     monkeypatch.setattr("sys.argv", ["benchmarks_page.py"])
     assert benchmarks_page.main() == 1
-    assert page.read_text().startswith(parts[0]) and "2.5 us" in page.read_text()
+    assert bad.with_suffix(".txt").read_text().endswith("once\n\n0\n")
+    assert "2.5 us" in good.with_suffix(".txt").read_text()
     assert capsys.readouterr().err == f"bad stays as it is: {bad}: exit status 3\n"

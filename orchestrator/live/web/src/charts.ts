@@ -77,7 +77,7 @@ class Chart {
     this.root = document.createElement("figure");
     this.root.className = "chart pending";
     const caption = document.createElement("figcaption");
-    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">[${panel.unit}]</span></span>`;
+    caption.innerHTML = `<span class="name">${panel.title} <span class="unit">${panel.unit && `[${panel.unit}]`}</span></span>`;
     const readout = document.createElement("span");
     readout.className = "readout";
     readout.setAttribute("aria-hidden", "true");
@@ -269,8 +269,7 @@ class Chart {
   #redraw(): void {
     this.#stale = false;
     this.root.classList.remove("pending");
-    const empty = new Float64Array(0);
-    this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => values ?? empty)]);
+    this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => withGaps(values))]);
     // uPlot takes on its new scales in a microtask, too.
     queueMicrotask(() => this.#point());
   }
@@ -305,6 +304,12 @@ class Chart {
   }
 }
 
+/** Values as uPlot takes them, to which null is a gap, and NaN is not. */
+function withGaps(values: Float64Array | undefined): Float64Array | (number | null)[] {
+  if (!values?.some(Number.isNaN)) return values ?? [];
+  return Array.from(values, (value) => (Number.isNaN(value) ? null : value));
+}
+
 /** uPlot follows the player, not the mouse by itself. */
 function silent(): uPlot.Cursor.Bind {
   const off = () => null;
@@ -333,11 +338,12 @@ export function rowAt(times: Float64Array, time: number): number {
 /** All sections of charts. */
 export class Charts {
   #charts: Chart[][] = [];
-  #from = 0;
+  #from: number;
   readonly #host: HTMLElement;
   readonly #scrub: (time: number) => void;
 
-  constructor(host: HTMLElement, scrub: (time: number) => void) {
+  constructor(host: HTMLElement, scrub: (time: number) => void, from: number) {
+    this.#from = from;
     this.#host = host;
     this.#scrub = scrub;
     addEventListener("beforeprint", () => {
@@ -389,8 +395,8 @@ export class Charts {
     input.value = String(this.#from);
     input.addEventListener("change", () => {
       const from = entered(input.value);
-      input.setAttribute("aria-invalid", String(!(from >= 0)));
-      if (!(from >= 0)) return;
+      input.setAttribute("aria-invalid", String(Number.isNaN(from)));
+      if (Number.isNaN(from)) return;
       this.#from = from;
       for (const chart of this.#charts.flat()) chart.begin(from);
     });

@@ -1,6 +1,6 @@
 // The controllers: a switch for each, and what the colours mean.
 
-import type { LoopData, Preset } from "./types";
+import type { Comparison, ShownLoop } from "./types";
 
 /** A sample of a line. */
 export function swatch(kind: string): string {
@@ -8,7 +8,7 @@ export function swatch(kind: string): string {
 }
 
 /** A sample of each vehicle's lines, with its name; of a single vehicle, nothing. */
-function vehicles({ loops, colours }: Preset): HTMLElement[] {
+function vehicles({ loops, colours }: Comparison): HTMLElement[] {
   return colours.map((colour, k) => {
     const item = document.createElement("li");
     item.innerHTML = swatch("vehicle");
@@ -21,7 +21,7 @@ function vehicles({ loops, colours }: Preset): HTMLElement[] {
 /** A switch for each controller; `changed` gets the labels of those that are hidden. */
 export function buildSwitches(
   host: HTMLElement,
-  loops: readonly LoopData[],
+  loops: readonly ShownLoop[],
   hidden: readonly string[],
   changed: (hidden: readonly string[]) => void,
 ): void {
@@ -52,16 +52,16 @@ export function buildSwitches(
  */
 export function fillLegend(
   host: HTMLElement,
-  preset: Preset,
-  loops: readonly LoopData[],
+  comparison: Comparison,
+  loops: readonly ShownLoop[],
   others: readonly string[],
 ): void {
-  const [first] = preset.colours;
+  const [first] = comparison.colours;
   const style = first === undefined ? "" : " of-all";
   const items = loops.map(({ label }, place) => [`${place}${style}`, label]);
   items.push(...others.map((name) => [name, name]));
   host.replaceChildren(
-    ...vehicles(preset),
+    ...vehicles(comparison),
     ...items.map(([kind, label]) => {
       const item = document.createElement("li");
       item.innerHTML = swatch(kind);

@@ -1,16 +1,12 @@
 // The page: what is set, the runs that follow from it, and what shows them.
 
-import { Charts, type Mark, rowAt } from "./charts";
 import { commandLine } from "./command";
 import { Controls } from "./controls";
-import { controlPoint, type Engine, metrics, Refusal, reference } from "./engine";
+import { Display, element } from "./display";
+import { type Engine, Refusal } from "./engine";
 import { EventsForm } from "./events_form";
-import { IndicesTable } from "./indices_table";
-import { buildSwitches, fillLegend } from "./legend";
+import { buildSwitches } from "./legend";
 import { fromHash, toHash } from "./link";
-import { type Chosen, interleaved, lines, longest, sections } from "./panels";
-import { Player } from "./player";
-import { missing, Scene, type Track } from "./scene";
 import {
   type Changes,
   eventsOf,
@@ -22,8 +18,7 @@ import {
   withValues,
 } from "./settings";
 import { csvLines, entered } from "./text";
-import { colourLines, palette, themeButton } from "./theme";
-import type { Data, LoopData, Preset, Result, VehicleData } from "./types";
+import type { Data, LoopData, Preset, Result } from "./types";
 
 /** The link is written so long after the last change [ms]: browsers limit how often it may be. */
 const LINK_AFTER = 300;
@@ -34,12 +29,6 @@ const SAID = 4000;
 /** How many parts of a link are listed. */
 const NAMED = 5;
 
-function element<T extends HTMLElement>(id: string): T {
-  const found = document.getElementById(id);
-  if (!found) throw new Error(`no element ${id}`);
-  return found as T;
-}
-
 function code(text: string): HTMLElement {
   const made = document.createElement("code");
   made.textContent = text;
@@ -49,12 +38,9 @@ function code(text: string): HTMLElement {
 export class Page {
   readonly #data: Data;
   readonly #engine: Engine;
-  readonly #charts: Charts;
+  readonly #display: Display;
   readonly #controls: Controls;
   readonly #events: EventsForm;
-  readonly #indices: IndicesTable;
-  readonly #player: Player;
-  readonly #scene: Scene | undefined;
   #settings: Settings;
   #preset: Preset;
   /** The preset that the controls and charts were made for. */
@@ -79,10 +65,7 @@ export class Page {
     const { settings, unknown } = fromHash(location.hash, data);
     this.#settings = settings;
     this.#preset = presetOf(data, settings.preset) ?? data.presets[0];
-    this.#scene = this.#makeScene();
-    this.#charts = new Charts(element("series"), (time) => {
-      if (!this.#player.isPlaying) this.#player.seek(time);
-    });
+    this.#display = new Display(data);
     this.#controls = new Controls(element("groups"), element("all"), element("search"), (values) =>
       this.set(values),
     );
@@ -90,36 +73,9 @@ export class Page {
       take: (events) => this.#take({ ...this.#settings, events, edits: {} }),
       edit: (number, edit) => this.#take(withEdit(this.#settings, this.#preset, number, edit)),
     });
-    this.#player = new Player(
-      {
-        toggle: element("play"),
-        slider: element("time"),
-        output: element("now"),
-        speed: element("speed"),
-        marks: element("marks"),
-      },
-      (time) => this.#showTime(time),
-    );
-    this.#indices = new IndicesTable(element("indices"), data.indices);
     this.#wire();
-    new ResizeObserver(([{ target }]) => {
-      document.documentElement.style.setProperty("--toolbar", `${target.clientHeight}px`);
-    }).observe(element("toolbar"));
-    themeButton(element("theme"), () => this.#paint());
     this.#open();
     this.#sayUnknown(unknown);
-  }
-
-  #makeScene(): Scene | undefined {
-    const host = element("scene");
-    const canvas = host.querySelector("canvas") as HTMLCanvasElement;
-    try {
-      return new Scene(host, canvas);
-    } catch {
-      canvas.remove();
-      host.append(missing("This browser has no WebGL: the path in space is not shown."));
-      return undefined;
-    }
   }
 
   #wire(): void {
@@ -202,49 +158,32 @@ export class Page {
     buildSwitches(element("loops"), this.#loops, this.#settings.hidden, (hidden) =>
       this.#take({ ...this.#settings, hidden }),
     );
-    this.#openVehicle();
     if (this.#preset !== this.#built) {
-      this.#charts.build(
-        sections(
-          this.#loops.map(({ label }) => label),
-          this.#data.units,
-          fleetOf(this.#preset).length,
-        ),
-      );
+      this.#display.build(this.#preset, this.#loops);
       this.#results = [];
     }
+    this.#openVehicle();
     this.#built = this.#preset;
     this.run();
-    this.#player.seek(this.#player.time);
+    const { player } = this.#display;
+    player.seek(player.time);
   }
 
-  /** Offers the preset's vehicles, and makes the controls of the one that is chosen. */
+  /** Makes the controls of the vehicle that is chosen. */
   #openVehicle(): void {
     const preset = this.#preset;
     const { vehicle } = this.#settings;
-    const isOther = preset !== this.#built;
-    if (isOther || vehicle !== this.#vehicle) {
+    if (preset !== this.#built || vehicle !== this.#vehicle) {
       this.#controls.build(preset, preset.loops[0].vehicles[this.#chosen]);
-      this.#paint();
+      this.#display.paint(preset.colours[this.#chosen]);
     }
     this.#vehicle = vehicle;
-    const select = element<HTMLSelectElement>("vehicle");
-    const fleet = fleetOf(preset);
-    (select.parentElement as HTMLElement).hidden = fleet.length < 2;
-    if (isOther) select.replaceChildren(...fleet.map((name) => new Option(name)));
-    select.value = vehicle;
+    element<HTMLSelectElement>("vehicle").value = vehicle;
   }
 
   /** The place of the chosen vehicle among all. */
   get #chosen(): number {
     return Math.max(0, fleetOf(this.#preset).indexOf(this.#settings.vehicle));
-  }
-
-  /** Charts have the colour of the chosen vehicle, and of a single one, those of the controllers. */
-  #paint(): void {
-    colourLines(this.#preset.colours[this.#chosen]);
-    this.#scene?.paint(palette());
-    this.#charts.repaint();
   }
 
   #take(settings: Settings): void {
@@ -343,65 +282,7 @@ export class Page {
   }
 
   #draw(): void {
-    const { units } = this.#data;
-    const place = Math.max(
-      0,
-      this.#results.findIndex((result) => result),
-    );
-    const first = this.#results[place];
-    const { colours, references: referenceColours, zUp } = this.#preset;
-    const fleet = this.#loops[place].vehicles;
-    const references = fleet.map((vehicle) => {
-      const points = first && reference(first, vehicle);
-      return points && interleaved(points);
-    });
-    const hasReference = references.some((points) => points);
-    const chosen: Chosen[] = this.#loops.map(({ vehicles }) => ({
-      vehicle: vehicles[this.#chosen],
-      fleet: vehicles,
-    }));
-    const end = Math.max(
-      ...this.#results.map((result) => result?.time[result.rows - 1] ?? 0),
-      1e-9,
-    );
-    const marks = marksOf(first, end);
-    const planners = Object.keys(this.#loops[place].components);
-    const waypoints = first && hasReference ? waypointsOf(first, planners) : [];
-    this.#charts.set(lines(this.#results, chosen, units), marks);
-    this.#scene?.set({
-      tracks: this.#results.map((result, k) =>
-        result ? this.#loops[k].vehicles.map((vehicle) => trackOf(result, vehicle)) : [],
-      ),
-      references,
-      colours,
-      referenceColours,
-      waypoints,
-      ell: Math.max(
-        ...fleet.map(({ vehicle }) => Number(first?.parameters[`${vehicle}.ell`] ?? 0)),
-      ),
-      zUp,
-    });
-    // A vehicle's own reference has its colour.
-    const isNamed = colours.length === 0 || referenceColours.some((one) => !colours.includes(one));
-    fillLegend(element("legend"), this.#preset, this.#loops, [
-      ...(hasReference && isNamed ? ["reference"] : []),
-      ...(waypoints.length ? ["waypoints"] : []),
-    ]);
-    this.#indices.show(
-      this.#results.flatMap((result, place) => {
-        if (!result) return [];
-        const { label } = this.#loops[place];
-        const { fleet } = chosen[place];
-        return [{ label, place, metrics: metrics(result, this.#chosen, fleet) }];
-      }),
-    );
-    this.#player.set(end, marks);
-  }
-
-  #showTime(time: number): void {
-    const whole = longest(this.#results);
-    if (whole) this.#scene?.show(rowAt(whole.time, time));
-    this.#charts.show(time);
+    this.#display.show(this.#preset, this.#loops, this.#results, this.#chosen);
   }
 
   #linkLater(): void {
@@ -478,33 +359,4 @@ export class Page {
       said.textContent = "";
     }, SAID);
   }
-}
-
-function trackOf(result: Result, vehicle: VehicleData): Track {
-  const angles = ["phi", "theta", "psi"].map((angle) => `${vehicle.vehicle}.eta.${angle}`);
-  return {
-    path: interleaved(controlPoint(result, vehicle)),
-    attitude: interleaved(angles.map((angle) => result.column(angle))),
-  };
-}
-
-/** The points that each PathPlanner runs through [m]; other components have none. */
-function waypointsOf({ parameters }: Result, components: readonly string[]): number[] {
-  return components.flatMap((name) => {
-    const has = parameters[`${name}.waypoint[1].x`] !== undefined;
-    const count = has ? Number(parameters[`${name}.count`]) : 0;
-    return Array.from({ length: 3 * count }, (_, i) =>
-      Number(parameters[`${name}.waypoint[${Math.floor(i / 3) + 1}].${"xyz"[i % 3]}`]),
-    );
-  });
-}
-
-/** What happens in a run: each event that begins, until its end, if it has one. */
-function marksOf(result: Result | undefined, end: number): Mark[] {
-  const happened = result?.happened ?? [];
-  return happened.flatMap(({ time, label, event }, k) => {
-    if (!label) return [];
-    const over = happened.find((other, n) => n > k && other.event === event && !other.label);
-    return [{ from: time, until: over?.time ?? end, label }];
-  });
 }

@@ -1,7 +1,8 @@
 // What the charts show of a run.
 
 import { commandName, inSteps, limits, smallestDistance, trackingError } from "./engine";
-import type { Data, Result, VehicleData } from "./types";
+import { escaped } from "./text";
+import type { Common, Run, Units, VehicleData } from "./types";
 
 /** Colour and style of a line: of a controller, of what is true or wanted, or of all vehicles. */
 export type Style = "first" | "second" | "reference" | "first-of-all" | "second-of-all";
@@ -34,7 +35,7 @@ export interface Lines {
 /** The sections of a page whose controllers have these names, for one vehicle or several. */
 export function sections(
   labels: readonly string[],
-  units: Data["units"],
+  units: Common["units"],
   vehicles: number,
 ): readonly Section[] {
   const both: Style[] = ["first", "second"];
@@ -91,7 +92,7 @@ export function sections(
 }
 
 /** The result with the most rows: a run that failed is shorter than the other. */
-export function longest(results: readonly (Result | undefined)[]): Result | undefined {
+export function longest(results: readonly (Run | undefined)[]): Run | undefined {
   return results.reduce(
     (best, one) => (one && one.rows > (best?.rows ?? 0) ? one : best),
     undefined,
@@ -112,19 +113,19 @@ export interface Chosen {
  * @param units of the groups of signals.
  */
 export function lines(
-  results: readonly (Result | undefined)[],
+  results: readonly (Run | undefined)[],
   chosen: readonly Chosen[],
-  units: Data["units"],
+  units: Common["units"],
 ): readonly (readonly Lines[])[] {
   const whole = longest(results);
   const time = whole?.time ?? new Float64Array(0);
   const rows = Math.max(0, (whole?.rows ?? 0) - 1);
   /** Times at which steps begin. */
   const starts = time.subarray(0, rows);
-  const of = <T>(make: (result: Result, chosen: Chosen) => T): (T | undefined)[] =>
+  const of = <T>(make: (result: Run, chosen: Chosen) => T): (T | undefined)[] =>
     results.map((result, place) => result && make(result, chosen[place]));
   const errors = of((result, { vehicle }) => trackingError(result, vehicle));
-  const steps = (result: Result | undefined, name: string) =>
+  const steps = (result: Run | undefined, name: string) =>
     result?.has(name) ? inSteps(result, name) : undefined;
   const observed = results.findIndex((result, place) =>
     result?.has(`${chosen[place].vehicle.controller}.dy_hat.x`),
@@ -144,7 +145,7 @@ export function lines(
       time: starts,
       values: [
         steps(results[observed], `${vehicle.controller}.dy_hat.${axis}`),
-        results[moving]?.column(`${vehicle.vehicle}.dy.${axis}`).subarray(0, rows),
+        known(results[moving], `${vehicle.vehicle}.dy.${axis}`)?.subarray(0, rows),
       ],
     })),
     Object.keys(units.theta_hat).map((k) => ({
@@ -153,6 +154,47 @@ export function lines(
     })),
     [{ time, values: of((result, { fleet }) => smallestDistance(result, fleet)) }],
   ];
+}
+
+/** Sections of runs without vehicles: for each group of columns, with a chart for each column. */
+export function columnSections(labels: readonly string[], columns: Units): readonly Section[] {
+  const styles = (["first", "second"] as const).slice(0, labels.length);
+  return groupsOf(columns).map(([title, names]) => ({
+    title,
+    note: "",
+    panels: names.map((name) => ({
+      title: escaped(name.slice(title.length).replace(/^\./, "")),
+      unit: escaped(columns[name]),
+      styles,
+      names: labels,
+    })),
+  }));
+}
+
+/** The lines of these charts. */
+export function columnLines(
+  results: readonly (Run | undefined)[],
+  columns: Units,
+): readonly (readonly Lines[])[] {
+  const whole = longest(results);
+  const time = whole?.time ?? new Float64Array(0);
+  return groupsOf(columns).map(([, names]) =>
+    names.map((name) => ({ time, values: results.map((result) => known(result, name)) })),
+  );
+}
+
+/** Columns by what their names begin with: `plant.eta` of `plant.eta.x`, `plant.u` of `plant.u[1]`. */
+function groupsOf(columns: Units): [string, string[]][] {
+  const groups = new Map<string, string[]>();
+  for (const name of Object.keys(columns)) {
+    const group = name.replace(/(\.[^.[]*|\[[^[]*)$/, "");
+    groups.set(group, [...(groups.get(group) ?? []), name]);
+  }
+  return [...groups];
+}
+
+function known(result: Run | undefined, name: string): Float64Array | undefined {
+  return result?.has(name) ? result.column(name) : undefined;
 }
 
 /** Columns beside each other: as many numbers for each row. */

@@ -21,6 +21,7 @@ const POSITIONS = 100;
 export class Player {
   readonly #bar: Bar;
   readonly #show: (time: number) => void;
+  #start = 0;
   #end = 0;
   #time = 0;
   #started: { time: number; now: number } | undefined;
@@ -47,42 +48,46 @@ export class Player {
 
   /** Positions of the slider in a second, a power of ten. */
   get #fine(): number {
-    return 10 ** Math.max(1, Math.ceil(Math.log10(POSITIONS / (this.#end || 1))));
+    return 10 ** Math.max(1, Math.ceil(Math.log10(POSITIONS / (this.#end - this.#start || 1))));
   }
 
   get isPlaying(): boolean {
     return this.#started !== undefined;
   }
 
-  /** Another run: its end [s], and what happens in it. */
-  set(end: number, marks: readonly Mark[]): void {
-    const isOther = end !== this.#end;
+  /** Another run: its start and end [s], and what happens in it. */
+  set(start: number, end: number, marks: readonly Mark[]): void {
+    const isOther = start !== this.#start || end !== this.#end;
+    const length = end - start;
     // At rest a run is shown as a whole.
     const isAtEnd = this.#time >= this.#end && !this.isPlaying;
+    this.#start = start;
     this.#end = end;
+    this.#bar.slider.min = String(Math.round(start * this.#fine));
     this.#bar.slider.max = String(Math.round(end * this.#fine));
     this.#bar.marks.replaceChildren(
       ...marks.map(({ from, until, label }) => {
         const mark = document.createElement("span");
-        mark.style.left = `${(100 * from) / end}%`;
-        mark.style.width = `${(100 * (Math.min(until, end) - from)) / end}%`;
+        mark.style.left = `${(100 * (from - start)) / length}%`;
+        mark.style.width = `${(100 * (Math.min(until, end) - from)) / length}%`;
         mark.title = `${label}, at ${general(from)} s`;
         return mark;
       }),
     );
     if (isOther) {
       const speeds = [...this.#bar.speed.options].map(({ value }) => Number(value));
-      const speed = speeds.find((s) => end / s <= PATIENCE) ?? speeds.at(-1);
+      const speed = speeds.find((s) => length / s <= PATIENCE) ?? speeds.at(-1);
       this.#bar.speed.value = String(speed);
     }
     if (isAtEnd || this.#time > end) this.#time = end;
+    this.#time = Math.max(start, this.#time);
     this.#restart();
     this.#tell();
   }
 
   /** Goes to a time; what plays goes on from there. */
   seek(time: number): void {
-    this.#time = Math.min(this.#end, Math.max(0, time));
+    this.#time = Math.min(this.#end, Math.max(this.#start, time));
     this.#restart();
     this.#tell();
   }
@@ -92,7 +97,7 @@ export class Player {
     if (this.#started) {
       this.#started = undefined;
     } else {
-      if (this.#time >= this.#end) this.#time = 0;
+      if (this.#time >= this.#end) this.#time = this.#start;
       this.#started = { time: this.#time, now: performance.now() };
       this.#frame = requestAnimationFrame((now) => this.#tick(now));
     }

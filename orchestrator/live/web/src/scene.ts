@@ -15,6 +15,7 @@ import {
 } from "./space";
 import { mixed, type Palette, vehicleColour } from "./theme";
 import { Turning } from "./turning";
+import type { Hull } from "./types";
 import { paintVehicle, vehicleMesh } from "./vehicle_mesh";
 
 /** Of a vehicle in a run: three numbers for each row. */
@@ -50,8 +51,8 @@ const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
 const LENGTH = 2;
 
-/** One for each vehicle, as many as a page has. */
-const MOST_TARGETS = 10;
+/** Of more vehicles not every reference has a mark. */
+const MOST_TARGETS = 1000;
 
 /** Half of the length of the lines of a waypoint's cross: a share of the scene. */
 const CROSS = 0.015;
@@ -87,6 +88,7 @@ interface Drawing {
 
 export class Scene {
   readonly #host: HTMLElement;
+  readonly #hull: Hull;
   readonly #renderer: Renderer;
   readonly #camera: Camera;
   readonly #root = new Transform();
@@ -118,8 +120,9 @@ export class Scene {
   #lost = false;
 
   /** Throws if there is no WebGL. */
-  constructor(host: HTMLElement, canvas: HTMLCanvasElement) {
+  constructor(host: HTMLElement, canvas: HTMLCanvasElement, hull: Hull) {
     this.#host = host;
+    this.#hull = hull;
     if (!(canvas.getContext("webgl2", { antialias: true, alpha: true }) as unknown)) {
       throw new Error("no WebGL");
     }
@@ -163,7 +166,10 @@ export class Scene {
     tracks.forEach((vehicles, controller) => {
       for (let vehicle = 0; vehicle < vehicles.length; vehicle++) {
         if (this.#drawing(controller, vehicle)) continue;
-        const made = { path: new PathLine(gl, 2.6, controller > 0), mesh: vehicleMesh(gl) };
+        const made = {
+          path: new PathLine(gl, 2.6, controller > 0),
+          mesh: vehicleMesh(gl, this.#hull),
+        };
         made.path.mesh.setParent(this.#root);
         made.mesh.matrixAutoUpdate = false;
         made.mesh.setParent(this.#root);

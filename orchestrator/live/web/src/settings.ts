@@ -1,6 +1,15 @@
 // What a user has set: a preset, and what differs from it.
 
-import type { Data, EventData, LoopData, Parameter, Preset, Value, Values } from "./types";
+import type {
+  Comparison,
+  Data,
+  EventData,
+  LoopData,
+  Parameter,
+  Preset,
+  Value,
+  Values,
+} from "./types";
 
 /** A changed time or duration of an event; `lasts` null: for good [s]. */
 export interface Edit {
@@ -33,9 +42,9 @@ export function presetOf(data: Data, name: string): Preset | undefined {
   return data.presets.find((preset) => preset.name === name);
 }
 
-/** The names of a preset's vehicles. */
-export function fleetOf(preset: Preset): readonly string[] {
-  return preset.loops[0].vehicles.map(({ name }) => name);
+/** The names of the vehicles of runs that are compared. */
+export function fleetOf({ loops }: Comparison): readonly string[] {
+  return loops[0].vehicles.map(({ name }) => name);
 }
 
 /** A preset as it is. */

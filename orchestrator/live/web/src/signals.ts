@@ -1,18 +1,18 @@
 // What follows from the rows of a run.
-import type { Metrics, Result, VehicleData } from "./types";
+import type { Metrics, Run, VehicleData } from "./types";
 
 const AXES = ["x", "y", "z"];
 
 type Columns = Float64Array[];
 
 /** What has been made of a run, by the names of the vehicles: the page asks more than once. */
-const points = new WeakMap<Result, Map<string, Columns>>();
-const errors = new WeakMap<Result, Map<string, Columns>>();
-const gaps = new WeakMap<Result, Float64Array>();
+const points = new WeakMap<Run, Map<string, Columns>>();
+const errors = new WeakMap<Run, Map<string, Columns>>();
+const gaps = new WeakMap<Run, Float64Array>();
 
 function made(
-  known: WeakMap<Result, Map<string, Columns>>,
-  result: Result,
+  known: WeakMap<Run, Map<string, Columns>>,
+  result: Run,
   vehicle: VehicleData,
   make: () => Columns,
 ): Columns {
@@ -23,7 +23,7 @@ function made(
 }
 
 /** The control point without noise, a coordinate each [m]: (9) on the vehicle's posture. */
-export function controlPoint(result: Result, vehicle: VehicleData): Columns {
+export function controlPoint(result: Run, vehicle: VehicleData): Columns {
   return made(points, result, vehicle, () => {
     const name = vehicle.vehicle;
     const [phi, theta, psi] = ["phi", "theta", "psi"].map((angle) =>
@@ -42,13 +42,13 @@ export function controlPoint(result: Result, vehicle: VehicleData): Columns {
 }
 
 /** The reference y_d, a coordinate each [m]; undefined: the vehicle has none. */
-export function reference(result: Result, { planner }: VehicleData): Columns | undefined {
+export function reference(result: Run, { planner }: VehicleData): Columns | undefined {
   if (!result.has(`${planner}.y_d.x`)) return undefined;
   return AXES.map((axis) => result.column(`${planner}.y_d.${axis}`));
 }
 
 /** e = y - y_d with the true control point [m]; undefined: the vehicle has no reference. */
-export function trackingError(result: Result, vehicle: VehicleData): Columns | undefined {
+export function trackingError(result: Run, vehicle: VehicleData): Columns | undefined {
   const wanted = reference(result, vehicle);
   if (wanted === undefined) return undefined;
   return made(errors, result, vehicle, () =>
@@ -58,7 +58,7 @@ export function trackingError(result: Result, vehicle: VehicleData): Columns | u
 
 /** Distance between the two centres of mass that are closest [m]; undefined: there is only one. */
 export function smallestDistance(
-  result: Result,
+  result: Run,
   fleet: readonly VehicleData[],
 ): Float64Array | undefined {
   if (fleet.length < 2) return undefined;
@@ -82,19 +82,19 @@ export function smallestDistance(
 }
 
 /** What acts in each step, or follows from inputs of its beginning. */
-export function inSteps(result: Result, name: string): Float64Array {
+export function inSteps(result: Run, name: string): Float64Array {
   return result.column(name).subarray(result.actingRow, result.rows - 1 + result.actingRow);
 }
 
 /** What is commanded: what the vehicle takes, or the allocation of one that takes no tau. */
-export function commandName(result: Result, vehicle: VehicleData, actuator: string): string {
+export function commandName(result: Run, vehicle: VehicleData, actuator: string): string {
   const taken = `${vehicle.vehicle}.tau.${actuator}`;
   return result.has(taken) ? taken : `${vehicle.allocation}.tau.${actuator}`;
 }
 
 /** Lower and upper limits of an actuator; undefined: they are no parameters of the vehicle. */
 export function limits(
-  result: Result,
+  result: Run,
   { vehicle }: VehicleData,
   actuator: string,
 ): readonly [number, number] | undefined {
@@ -109,9 +109,9 @@ export function limits(
  * @param place of the vehicle that they are of.
  * @param fleet all vehicles, for what there is of several together.
  */
-export function metrics(result: Result, place: number, fleet: readonly VehicleData[]): Metrics {
+export function metrics(result: Run, place: number, fleet: readonly VehicleData[]): Metrics {
   const found = result.metrics[place];
   const apart = smallestDistance(result, fleet);
   if (apart === undefined) return found;
-  return { ...found, smallest_distance: [apart.reduce((a, b) => Math.min(a, b))] };
+  return { smallest_distance: [apart.reduce((a, b) => Math.min(a, b))], ...found };
 }

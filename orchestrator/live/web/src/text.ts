@@ -12,6 +12,11 @@ export function general(value: number, digits = 6): string {
   return `${trimmed(mantissa)}e${sign}${String(Math.abs(power)).padStart(2, "0")}`;
 }
 
+/** A text in HTML. */
+export function escaped(text: string): string {
+  return text.replace(/[&<>"]/g, (letter) => `&#${letter.charCodeAt(0)};`);
+}
+
 /** The number that a text is; NaN: it is none. */
 export function numberOf(text: string): number {
   return text.trim() === "" ? Number.NaN : Number(text);

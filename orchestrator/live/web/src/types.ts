@@ -76,14 +76,18 @@ export interface VehicleData {
   readonly allocation: string;
 }
 
-/** Vehicles with their controllers, ready to be run. */
-export interface LoopData {
+/** Vehicles with their controllers. */
+export interface ShownLoop {
   /** For legends: `proposed`, `PD`, ... */
   readonly label: string;
+  /** At least one; none: only charts are shown. */
+  readonly vehicles: readonly VehicleData[];
+}
+
+/** Vehicles with their controllers, ready to be run. */
+export interface LoopData extends ShownLoop {
   /** The scenario that `auv-fmu run` knows it by; absent: it has none of its own. */
   readonly scenario?: string;
-  /** At least one. */
-  readonly vehicles: readonly VehicleData[];
   /** What is measured of each vehicle, by its place in `Data.measured`. */
   readonly measured: readonly number[];
   /** FMUs by the names of the components. */
@@ -117,27 +121,34 @@ export interface LoopData {
   readonly events: Readonly<Record<string, readonly EventData[]>>;
 }
 
+/** Runs beside each other, and how they are drawn. */
+export interface Comparison {
+  /** The scenario's own loop, and the one that it is compared with, if there is one. */
+  readonly loops: readonly ShownLoop[];
+  /** Whether z is drawn upwards. */
+  readonly zUp: boolean;
+  /** A colour for each of several vehicles, `#rrggbb`; of a single one, none. */
+  readonly colours: readonly string[];
+  /** The same for their references: a grey where several vehicles follow the same one. */
+  readonly references: readonly string[];
+  /** Columns that have charts where there is no vehicle, with their units. */
+  readonly columns?: Units;
+}
+
 /** A scenario of `auv-fmu list`, with its comparison beside it. */
-export interface Preset {
+export interface Preset extends Comparison {
   readonly name: string;
   readonly title: string;
   readonly remark: string;
-  /** Whether z is drawn upwards. */
-  readonly zUp: boolean;
   /** [s] */
   readonly stopTime: number;
   /** Communication step [s]. */
   readonly step: number;
   /** The scenario whose events happen; `""`: none. */
   readonly events: string;
-  /** The scenario's own loop, and the one that it is compared with, if there is one. */
   readonly loops: readonly LoopData[];
   /** Places of the loops, in the order in which they are drawn. */
   readonly drawn: readonly number[];
-  /** A colour for each of several vehicles, `#rrggbb`; of a single one, none. */
-  readonly colours: readonly string[];
-  /** The same for their references: a grey where several vehicles follow the same one. */
-  readonly references: readonly string[];
 }
 
 /** Units as they are printed, by the members of a group; a single number has the member `""`. */
@@ -161,16 +172,29 @@ export interface ReducerData {
   readonly gives: readonly string[];
 }
 
-/** All that Python writes into the page, besides script and modules. */
-export interface Data {
+/** The shape of the drawn vehicle, in shares of its length. */
+export interface Hull {
+  /** Distance from the nose and radius of each ring. */
+  readonly rings: readonly (readonly [number, number])[];
+  /** Corners of the upper fin: distance from the nose, and height above the axis. */
+  readonly fin: readonly (readonly [number, number])[];
+}
+
+/** What Python writes into a page that shows runs, wherever they come from. */
+export interface Common {
+  /** Of the groups of signals that have charts. */
+  readonly units: Readonly<Record<"e" | "tau" | "dy" | "theta_hat", Units>>;
+  readonly indices: readonly IndexData[];
+  readonly hull: Hull;
+}
+
+/** All that Python writes into the live page, besides script and modules. */
+export interface Data extends Common {
   /** The preset that is shown first. */
   readonly opened: string;
   /** Rows of more steps than this, of all vehicles together, do not fit into a page. */
   readonly mostSteps: number;
-  /** Of the groups of signals that have charts. */
-  readonly units: Readonly<Record<"e" | "tau" | "dy" | "theta_hat", Units>>;
   readonly presets: readonly Preset[];
-  readonly indices: readonly IndexData[];
   /** For vehicles. */
   readonly measured: readonly (readonly ReducerData[])[];
 }
@@ -186,27 +210,31 @@ export interface Occurrence {
   readonly event: number;
 }
 
-/** A run: rows at t = 0 and after each step. */
-export interface Result {
+/** What is shown of a run: rows at the start and after steps. */
+export interface Run {
   /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
   readonly actingRow: number;
-  /** Names of all ports, as in result.csv after `time`, but for `faults`. */
+  /** Names of all columns after the time. */
   readonly columns: readonly string[];
-  /** Outputs that are 0 in every row, and stand in result.csv after so many columns. */
-  readonly faults: ReadonlyMap<number, string>;
   /** How many rows there are. */
   readonly rows: number;
-  /** Row by row: the time, then the columns. */
-  readonly table: Float64Array;
   readonly time: Float64Array;
   /** A column by its name; made once. */
   column(name: string): Float64Array;
   has(name: string): boolean;
-  /** Values of all parameters, as they were set. */
+  /** Values of parameters, as they were set. */
   readonly parameters: Values;
   readonly happened: readonly Occurrence[];
   /** Indices of each vehicle; what is not there is absent. */
   readonly metrics: readonly Metrics[];
+}
+
+/** A run that the page has made: rows at t = 0 and after each step, and all ports but `faults`. */
+export interface Result extends Run {
+  /** Outputs that are 0 in every row, and stand in result.csv after so many columns. */
+  readonly faults: ReadonlyMap<number, string>;
+  /** Row by row: the time, then the columns. */
+  readonly table: Float64Array;
   /** What components say, `controller: ...`. */
   readonly messages: readonly string[];
   /** Why the run has not come to its end; the rows before that are there. */
@@ -228,3 +256,20 @@ export interface Options {
 
 /** Members of each index by its name, in the order of `IndexData.units`. */
 export type Metrics = Readonly<Record<string, readonly number[]>>;
+
+/** A run whose rows stand in the page: its columns one after the other, the time first. */
+export interface StoredRun extends ShownLoop {
+  readonly actingRow: number;
+  readonly rows: number;
+  /** Columns of doubles; all others have single precision. */
+  readonly doubles: readonly string[];
+  readonly singles: readonly string[];
+  readonly parameters: Values;
+  readonly happened: readonly Occurrence[];
+  readonly metrics: readonly Metrics[];
+}
+
+/** All that Python writes into a page of stored runs, besides script and rows. */
+export interface StoredData extends Common, Comparison {
+  readonly loops: readonly StoredRun[];
+}

@@ -2,6 +2,7 @@
 
 import { Geometry, Mesh, type OGLRenderingContext, Program } from "ogl";
 import type { Colour } from "./lines";
+import type { Hull } from "./types";
 
 interface Body {
   /** Body frame: x ahead, y to starboard, z down. */
@@ -11,26 +12,7 @@ interface Body {
   parts: Float32Array;
 }
 
-/** Distance from the nose and radius of the rings of the hull. */
-const RINGS: readonly (readonly [number, number])[] = [
-  [0, 0],
-  [0.02, 0.04],
-  [0.08, 0.075],
-  [0.18, 0.09],
-  [0.7, 0.09],
-  [0.9, 0.05],
-  [1, 0.02],
-];
-
 const SIDES = 20;
-
-/** Corners of the upper fin: distance from the nose, and height above the axis. */
-const FIN: readonly (readonly [number, number])[] = [
-  [0.74, 0.05],
-  [0.84, 0.22],
-  [0.94, 0.22],
-  [0.94, 0.03],
-];
 
 /** Up, to starboard, down, to port: y and z. */
 const FINS: readonly (readonly [number, number])[] = [
@@ -42,7 +24,7 @@ const FINS: readonly (readonly [number, number])[] = [
 
 type Point = readonly [number, number, number];
 
-function body(): Body {
+function body({ rings, fin }: Hull): Body {
   const positions: number[] = [];
   const normals: number[] = [];
   const parts: number[] = [];
@@ -52,9 +34,9 @@ function body(): Body {
     parts.push(part);
   };
   const ringPoint = (ring: number, side: number): [Point, Point] => {
-    const [distance, radius] = RINGS[ring];
-    const [before, wider] = RINGS[Math.max(ring - 1, 0)];
-    const [after, narrower] = RINGS[Math.min(ring + 1, RINGS.length - 1)];
+    const [distance, radius] = rings[ring];
+    const [before, wider] = rings[Math.max(ring - 1, 0)];
+    const [after, narrower] = rings[Math.min(ring + 1, rings.length - 1)];
     const angle = (2 * Math.PI * side) / SIDES;
     const slope = (narrower - wider) / (after - before);
     const size = Math.hypot(1, slope);
@@ -64,7 +46,7 @@ function body(): Body {
       [slope / size, c / size, s / size],
     ];
   };
-  for (let ring = 0; ring + 1 < RINGS.length; ring++) {
+  for (let ring = 0; ring + 1 < rings.length; ring++) {
     for (let side = 0; side < SIDES; side++) {
       const a = ringPoint(ring, side);
       const b = ringPoint(ring, side + 1);
@@ -74,7 +56,7 @@ function body(): Body {
     }
   }
   FINS.forEach(([y, z], i) => {
-    const points = FIN.map(([distance, height]): Point => [-distance, height * y, height * z]);
+    const points = fin.map(([distance, height]): Point => [-distance, height * y, height * z]);
     for (const k of [0, 1, 2, 0, 2, 3]) corner(points[k], [0, z, y], i === 0 ? 1 : 2);
   });
   return {
@@ -110,8 +92,8 @@ const FRAGMENT = /* glsl */ `
   }
 `;
 
-export function vehicleMesh(gl: OGLRenderingContext): Mesh {
-  const { positions, normals, parts } = body();
+export function vehicleMesh(gl: OGLRenderingContext, hull: Hull): Mesh {
+  const { positions, normals, parts } = body(hull);
   const geometry = new Geometry(gl, {
     position: { size: 3, data: positions },
     normal: { size: 3, data: normals },

@@ -5,6 +5,7 @@ import { load } from "./load.mjs";
 
 const { valueAt, positionOf, POSITIONS } = await load("sliders");
 const { tick } = await load("charts");
+const { columnLines, columnSections } = await load("panels");
 const { boxOf, distanceFor, drawn, eyeAxes, rotation, ticks } = await load("space");
 
 const near = (found, wanted, tolerance = 1e-12) =>
@@ -94,4 +95,27 @@ test("labels of an axis are short, differ, and lose no digit", () => {
   const labels = [0, 1, -0.5, 99999, 1e5, -1e6, 1.5e6, 2e9, 2.5e-5, 0.001].map(tick);
   const wanted = ["0", "1", "−0.5", "99999", "1e5", "−1e6", "1.5e6", "2e9", "2.5e−5", "0.001"];
   assert.deepEqual(labels, wanted);
+});
+
+test("columns without a vehicle have a chart each, in sections by their names", () => {
+  const columns = { "a.y.x": "m", "b.w[1]": "", "a.y.z": "m/s", "b.<i>": "K", "b.w[2]": "" };
+  const sections = columnSections(["one", "two"], columns);
+  assert.deepEqual(
+    sections.map(({ title, panels }) => [title, panels.map((panel) => [panel.title, panel.unit])]),
+    [
+      ["a.y", [["x", "m"], ["z", "m/s"]]],
+      ["b.w", [["[1]", ""], ["[2]", ""]]],
+      ["b", [["&#60;i&#62;", "K"]]],
+    ],
+  ); // biome-ignore format: a table
+  const values = { "a.y.x": [1, 2, 3] };
+  const run = {
+    rows: 3,
+    time: [0, 1, 2],
+    has: (name) => name in values,
+    column: (name) => values[name],
+  };
+  const [[x, z]] = columnLines([undefined, run], columns);
+  assert.deepEqual([x.time, x.values], [run.time, [undefined, [1, 2, 3]]]);
+  assert.deepEqual(z.values, [undefined, undefined]);
 });

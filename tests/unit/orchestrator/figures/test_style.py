@@ -1,11 +1,13 @@
-"""Headings: symbols are set, everything else is text."""
+"""Headings: symbols are set, everything else is text. Colours: each vehicle has its own."""
+
+import re
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
-from orchestrator.figures.style import heading
+from orchestrator.figures.style import REFERENCE, heading, vehicle_colours
 
 
 @pytest.mark.parametrize(
@@ -27,3 +29,11 @@ def test_no_title_is_a_broken_formula(title):
     figure = Figure()
     figure.suptitle(heading(title))
     figure.draw_without_rendering()
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 8, 20, 40])
+def test_vehicles_have_different_colours(n):
+    colours = vehicle_colours(n)
+    assert len(set(colours)) == len(colours) == n
+    assert all(re.fullmatch("#[0-9A-F]{6}", colour) for colour in colours)
+    assert REFERENCE not in colours

@@ -1,0 +1,232 @@
+"""A film of a run: its vehicles in space, beside them signals over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from math import inf
+from pathlib import Path
+from subprocess import CalledProcessError
+from typing import Any, NamedTuple
+
+import numpy as np
+from matplotlib.animation import FFMpegWriter
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from PIL import Image
+
+from auv_fmu.paper.attitude import rotation_from_euler
+from orchestrator.figures.drawing import styled
+from orchestrator.figures.event_marks import list_events
+from orchestrator.figures.fleet_panels import ERRORS, SMALLEST_DISTANCE
+from orchestrator.figures.panels import COMMANDS, Cell, frame_path
+from orchestrator.figures.run_figures import ALL_ERRORS
+from orchestrator.figures.style import (
+    COLOURS,
+    FIN,
+    REFERENCE,
+    RINGS,
+    Drawn,
+    heading,
+    reference_colours,
+    vehicle_colours,
+)
+from orchestrator.machine.errors import InputError
+from orchestrator.vehicle.signals import real_parameter, true_control_point
+
+#: Sides of the hull.
+_SIDES = 12
+
+#: Colours of the hull of a single vehicle, of the upper fin, which shows the roll, and of the rest.
+_HULL, _UPPER, _OTHER = COLOURS[5], COLOURS[0], REFERENCE
+
+#: Edges of its faces.
+_EDGES: Any = {"edgecolors": "#333333", "linewidths": 0.2}
+
+#: Length of the drawn vehicle: a share of the largest extent of the paths, and at least times ell.
+_SHARE, _LENGTH = 0.2, 2.0
+
+#: Points that a path is drawn through, at most; and of more vehicles than this none is named.
+_POINTS, _MOST_NAMED = 2000, 12
+
+#: Panels beside the scene, each with its share of the height: of one vehicle, and of several.
+_PANELS = {False: {ALL_ERRORS: 1, COMMANDS: 3}, True: {ERRORS: 1, SMALLEST_DISTANCE: 1}}
+
+#: Length of a film whose speed is not given [s], and pixels in an inch of its figure.
+_DURATION, _DPI = 10.0, 90
+
+#: Least and largest width and height [px].
+_SIZES = 200, 4000
+
+
+class Film(NamedTuple):
+    """How a run is filmed.
+
+    Attributes:
+        fps: frames per second.
+        size: width and height [px].
+        speed: seconds of the run in a second of the film; None: the film lasts 10 s.
+
+    """
+
+    fps: int = 20
+    size: tuple[int, int] = (756, 450)
+    speed: float | None = None
+
+    def check(self, path: Path) -> None:
+        """Check before a run that its film can be written.
+
+        Raises:
+            InputError: the format is unknown or not available, or a number is out of bounds.
+
+        """
+        if path.suffix not in (".gif", ".mp4"):
+            raise InputError(f"{path}: must end with .gif or .mp4")
+        if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
+            raise InputError(f"{path}: an .mp4 needs ffmpeg, which is not installed; write a .gif")
+        if not 1 <= self.fps <= 50:
+            raise InputError(f"--fps {self.fps}: must be from 1 to 50")
+        least, most = _SIZES
+        if not all(least <= pixels <= most for pixels in self.size):
+            raise InputError(f"--size: width and height must be from {least} to {most}")
+        if self.speed is not None and not 0.0 < self.speed < inf:
+            raise InputError(f"--speed {self.speed:g}: must be positive, and finite")
+
+
+class _Drawn(Figure):
+    """A figure whose picture is what was last drawn: a writer draws nothing again."""
+
+    def savefig(self, fname: Any, **_: Any) -> None:
+        """Give the picture to a writer of films."""
+        canvas: Any = self.canvas
+        fname.write(canvas.buffer_rgba())
+
+
+def animate(text: str, run: Drawn, path: Path, film: Film) -> None:
+    """Write a film of a run: of its vehicle, or of all of them together.
+
+    Args:
+        text: heading.
+        run: with the ports of its vehicles, and of their planners if there are references.
+        path: of a .gif, or of an .mp4 where ffmpeg is installed.
+        film: how it is filmed.
+
+    Raises:
+        InputError: the film cannot be written.
+
+    """
+    film.check(path)
+    with styled():
+        width, height = film.size
+        figure = _Drawn(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
+        frames = _frames(figure, text, run, film)
+        if path.suffix == ".gif":
+            first = next(frames).quantize(256, method=Image.Quantize.MAXCOVERAGE)
+            # One palette for all: colours do not flicker, and it is found once.
+            rest = (one.quantize(palette=first, dither=Image.Dither.NONE) for one in frames)
+            first.save(path, save_all=True, append_images=rest, duration=1000 // film.fps, loop=0)
+            return
+        writer = FFMpegWriter(film.fps)
+        try:
+            with writer.saving(figure, str(path), _DPI):
+                for _ in frames:
+                    writer.grab_frame()
+        except (OSError, CalledProcessError) as error:
+            raise InputError(f"{path}: ffmpeg could not write it") from error
+
+
+def _frames(figure: Figure, text: str, run: Drawn, film: Film) -> Iterator[Image.Image]:
+    """Draw each frame in the figure: what does not move is drawn once."""
+    canvas: Any = FigureCanvasAgg(figure)
+    time = run.result.time
+    duration = _DURATION if film.speed is None else float(np.ptp(time)) / film.speed
+    instants = np.linspace(time[0], time[-1], max(2, round(duration * film.fps)))
+    figure.suptitle(heading(text))
+    grid = figure.add_gridspec(1, 2, width_ratios=(1.5, 1))
+    space = figure.add_subplot(grid[0], projection="3d")
+    move = _draw_scene(space, run)
+    panels = _draw_panels(figure, grid[1], run)
+    list_events(figure, [run], grow=False)
+    cursors = [
+        axes.axvline(time[0], color="black", linewidth=1.0, animated=True) for axes in panels
+    ]
+    canvas.draw()
+    figure.set_layout_engine("none")
+    background = canvas.copy_from_bbox(figure.bbox)
+    for row in np.searchsorted(time, instants).clip(0, len(time) - 1).tolist():
+        canvas.restore_region(background)
+        for artist in move(row):
+            space.draw_artist(artist)
+        for axes, cursor in zip(panels, cursors, strict=True):
+            cursor.set_xdata([time[row]] * 2)
+            axes.draw_artist(cursor)
+        yield Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())
+
+
+def _draw_scene(axes: Any, run: Drawn) -> Callable[[int], list[Any]]:
+    """Draw what does not move; the function moves the rest to a row, and gives what to draw."""
+    table, n = run.result, len(run.loops)
+    stride = -(-len(table) // _POINTS)
+    seen = paths = [true_control_point(table, loop) for loop in run.loops]
+    references = reference_colours(run.loops) if n > 1 else [REFERENCE]
+    for y_d, colour in dict(zip((one.y_d for one in run.loops), references, strict=True)).items():
+        if not table.missing(y_d):
+            seen = [*seen, table.group(*y_d)]
+            axes.plot(*seen[-1][::stride].T, color=colour, linestyle="--", linewidth=0.8)
+    points = np.vstack(seen)
+    frame_path(axes, points, run.z_up)
+    ell = max(real_parameter(table, loop.ell) for loop in run.loops)
+    extent = float((np.nanmax(points, axis=0) - np.nanmin(points, axis=0)).max())
+    faces, part = _body(max(_SHARE * extent / n**0.5, _LENGTH * ell), run.z_up)
+    trails, hulls = [], []
+    for loop, colour in zip(run.loops, vehicle_colours(n), strict=True):
+        trails += axes.plot([], [], [], color=colour, label=loop.name, animated=True)
+        paint = np.array([colour if n > 1 else _HULL, _UPPER, _OTHER])[part]
+        hulls.append(Poly3DCollection(faces, facecolors=paint, animated=True, **_EDGES))
+        axes.add_collection3d(hulls[-1], autolim=False)
+    if 1 < n <= _MOST_NAMED:
+        axes.legend(loc="upper left", bbox_to_anchor=(0.0, 0.94))
+    caption = axes.text2D(0.0, 1.0, "", transform=axes.transAxes, va="top", animated=True)
+
+    def move(row: int) -> list[Any]:
+        caption.set_text(f"t = {table.time[row]:.1f} s")
+        for loop, y, trail, hull in zip(run.loops, paths, trails, hulls, strict=True):
+            trail.set_data_3d(*y[: row + 1 : stride].T)
+            euler = table.group(*loop.attitude)[row].tolist()
+            hull.set_verts(y[row] + faces @ np.array(rotation_from_euler(*euler)).T)
+            hull.do_3d_projection()
+        return [*trails, *hulls, caption]
+
+    return move
+
+
+def _body(length: float, z_up: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Faces of a vehicle, its nose in the origin: corners in the body's axes, and parts.
+
+    Parts are the hull, the upper fin and the other fins.
+    """
+    angles = 2.0 * np.pi * np.arange(_SIDES + 1) / _SIDES
+    rings = np.array([[(-x, r * np.cos(a), r * np.sin(a)) for a in angles] for x, r in RINGS])
+    hull = np.stack((rings[:-1, :-1], rings[:-1, 1:], rings[1:, 1:], rings[1:, :-1]), axis=2)
+    # Up, to starboard, down, to port: z is down.
+    sides = (0, -1), (1, 0), (0, 1), (-1, 0)
+    fins = [[(-x, height * y, height * z) for x, height in FIN] for y, z in sides]
+    faces = length * np.concatenate((hull.reshape(-1, 4, 3), fins))
+    part = np.array([0] * (len(faces) - len(fins)) + [1, 2, 2, 2])
+    return faces * ((1.0, -1.0, -1.0) if z_up else 1.0), part
+
+
+def _draw_panels(figure: Figure, place: SubplotSpec, run: Drawn) -> list[Any]:
+    """Draw the panels beside the scene, as far as there is something in them; gives their axes."""
+    shares = {
+        panel: share
+        for panel, share in _PANELS[len(run.loops) > 1].items()
+        if any(not run.result.missing(*panel.needs(loop)) for loop in run.loops)
+    }
+    before = len(figure.axes)
+    if shares:
+        grid = place.subgridspec(len(shares), 1, height_ratios=list(shares.values()))
+        for i, panel in enumerate(shares):
+            panel.draw(Cell(figure, grid[i]), [run])
+    return figure.axes[before:]

@@ -1,0 +1,214 @@
+// What shows runs: the path in space, the charts, the indices, and the player that moves them all.
+
+import { Charts, type Mark, rowAt } from "./charts";
+import { controlPoint, metrics, reference } from "./engine";
+import { IndicesTable } from "./indices_table";
+import { fillLegend } from "./legend";
+import { columnLines, columnSections, interleaved, lines, longest, sections } from "./panels";
+import { Player } from "./player";
+import { missing, Scene, type Track } from "./scene";
+import { fleetOf } from "./settings";
+import { colourLines, palette, themeButton } from "./theme";
+import type { Common, Comparison, Run, ShownLoop, VehicleData } from "./types";
+
+export function element<T extends HTMLElement>(id: string): T {
+  const found = document.getElementById(id);
+  if (!found) throw new Error(`no element ${id}`);
+  return found as T;
+}
+
+export class Display {
+  readonly player: Player;
+  readonly #common: Common;
+  readonly #charts: Charts;
+  readonly #indices: IndicesTable;
+  readonly #scene: Scene | undefined;
+  #results: readonly (Run | undefined)[] = [];
+  /** The colour of the lines of a chosen vehicle; undefined: each controller has its own. */
+  #colour: string | undefined;
+
+  /** Charts begin at a time [s]. */
+  constructor(common: Common, from = 0) {
+    this.#common = common;
+    this.#scene = this.#makeScene();
+    this.#charts = new Charts(
+      element("series"),
+      (time) => {
+        if (!this.player.isPlaying) this.player.seek(time);
+      },
+      from,
+    );
+    this.player = new Player(
+      {
+        toggle: element("play"),
+        slider: element("time"),
+        output: element("now"),
+        speed: element("speed"),
+        marks: element("marks"),
+      },
+      (time) => this.#showTime(time),
+    );
+    this.#indices = new IndicesTable(element("indices"), common.indices);
+    new ResizeObserver(([{ target }]) => {
+      document.documentElement.style.setProperty("--toolbar", `${target.clientHeight}px`);
+    }).observe(element("toolbar"));
+    themeButton(element("theme"), () => this.#paint());
+  }
+
+  #makeScene(): Scene | undefined {
+    const host = element("scene");
+    const canvas = host.querySelector("canvas") as HTMLCanvasElement;
+    try {
+      return new Scene(host, canvas, this.#common.hull);
+    } catch {
+      canvas.remove();
+      host.append(missing("This browser has no WebGL: the path in space is not shown."));
+      return undefined;
+    }
+  }
+
+  /** Makes the charts of runs, by the loops in the order in which they are drawn. */
+  build(comparison: Comparison, loops: readonly ShownLoop[]): void {
+    const labels = loops.map(({ label }) => label);
+    const fleet = fleetOf(comparison);
+    const { columns = {} } = comparison;
+    const { units } = this.#common;
+    this.#charts.build(
+      fleet.length > 0 ? sections(labels, units, fleet.length) : columnSections(labels, columns),
+    );
+    this.#results = [];
+    // One of several vehicles is chosen.
+    const select = element<HTMLSelectElement>("vehicle");
+    (select.parentElement as HTMLElement).hidden = fleet.length < 2;
+    select.replaceChildren(...fleet.map((name) => new Option(name)));
+  }
+
+  /** Charts have the colour of the chosen vehicle, and of a single one, those of the controllers. */
+  paint(colour: string | undefined): void {
+    this.#colour = colour;
+    this.#paint();
+  }
+
+  #paint(): void {
+    colourLines(this.#colour);
+    this.#scene?.paint(palette());
+    this.#charts.repaint();
+  }
+
+  /**
+   * Shows runs.
+   *
+   * @param comparison that they belong to.
+   * @param loops in the order in which they are drawn.
+   * @param results of these; undefined: one is hidden.
+   * @param chosen the place of the vehicle that charts and indices are of.
+   */
+  show(
+    comparison: Comparison,
+    loops: readonly ShownLoop[],
+    results: readonly (Run | undefined)[],
+    chosen: number,
+  ): void {
+    this.#results = results;
+    const place = Math.max(
+      0,
+      results.findIndex((result) => result),
+    );
+    const first = results[place];
+    const times = results.flatMap((result) => (result?.rows ? [result.time] : []));
+    const start = times.length ? Math.min(...times.map((time) => time[0])) : 0;
+    const end = Math.max(start + 1e-9, ...times.map((time) => time[time.length - 1]));
+    const marks = marksOf(first, end);
+    const { units } = this.#common;
+    const { columns = {} } = comparison;
+    const hasVehicles = fleetOf(comparison).length > 0;
+    const looked = loops.map(({ vehicles }) => ({ vehicle: vehicles[chosen], fleet: vehicles }));
+    this.#charts.set(
+      hasVehicles ? lines(results, looked, units) : columnLines(results, columns),
+      marks,
+    );
+    if (hasVehicles) this.#showPaths(comparison, loops, results, place);
+    this.#indices.show(
+      results.flatMap((result, place) => {
+        if (!result || !hasVehicles) return [];
+        const { label } = loops[place];
+        return [{ label, place, metrics: metrics(result, chosen, looked[place].fleet) }];
+      }),
+    );
+    this.player.set(start, end, marks);
+  }
+
+  #showPaths(
+    comparison: Comparison,
+    loops: readonly ShownLoop[],
+    results: readonly (Run | undefined)[],
+    place: number,
+  ): void {
+    const first = results[place];
+    const { colours, references: referenceColours, zUp } = comparison;
+    const fleet = loops[place].vehicles;
+    const references = fleet.map((vehicle) => {
+      const points = first && reference(first, vehicle);
+      return points && interleaved(points);
+    });
+    const hasReference = references.some((points) => points);
+    const waypoints = first && hasReference ? waypointsOf(first) : [];
+    this.#scene?.set({
+      tracks: results.map((result, k) =>
+        result ? loops[k].vehicles.map((vehicle) => trackOf(result, vehicle)) : [],
+      ),
+      references,
+      colours,
+      referenceColours,
+      waypoints,
+      ell: Math.max(
+        ...fleet.map(({ vehicle }) => Number(first?.parameters[`${vehicle}.ell`] ?? 0)),
+      ),
+      zUp,
+    });
+    // A vehicle's own reference has its colour.
+    const isNamed = colours.length === 0 || referenceColours.some((one) => !colours.includes(one));
+    fillLegend(element("legend"), comparison, loops, [
+      ...(hasReference && isNamed ? ["reference"] : []),
+      ...(waypoints.length ? ["waypoints"] : []),
+    ]);
+  }
+
+  #showTime(time: number): void {
+    const whole = longest(this.#results);
+    if (whole) this.#scene?.show(rowAt(whole.time, time));
+    this.#charts.show(time);
+  }
+}
+
+function trackOf(result: Run, vehicle: VehicleData): Track {
+  const angles = ["phi", "theta", "psi"].map((angle) => `${vehicle.vehicle}.eta.${angle}`);
+  return {
+    path: interleaved(controlPoint(result, vehicle)),
+    attitude: interleaved(angles.map((angle) => result.column(angle))),
+  };
+}
+
+/** The end of the name of the first parameter of a PathPlanner's waypoints. */
+const WAYPOINT = ".waypoint[1].x";
+
+/** The points that each PathPlanner runs through [m]; other components have none. */
+function waypointsOf({ parameters }: Run): number[] {
+  const planners = Object.keys(parameters).filter((name) => name.endsWith(WAYPOINT));
+  return planners.flatMap((first) => {
+    const name = first.slice(0, -WAYPOINT.length);
+    return Array.from({ length: 3 * Number(parameters[`${name}.count`]) }, (_, i) =>
+      Number(parameters[`${name}.waypoint[${Math.floor(i / 3) + 1}].${"xyz"[i % 3]}`]),
+    );
+  });
+}
+
+/** What happens in a run: each event that begins, until its end, if it has one. */
+function marksOf(result: Run | undefined, end: number): Mark[] {
+  const happened = result?.happened ?? [];
+  return happened.flatMap(({ time, label, event }, k) => {
+    if (!label) return [];
+    const over = happened.find((other, n) => n > k && other.event === event && !other.label);
+    return [{ from: time, until: over?.time ?? end, label }];
+  });
+}
