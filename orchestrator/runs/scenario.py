@@ -87,6 +87,29 @@ def vehicle_names(n: int | None) -> list[str]:
     return [EACH_VEHICLE.replace("*", str(number)) for number in range(1, n + 1)]
 
 
+def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace each entry of a table that has a star by one for each name; other entries win.
+
+    Args:
+        star: stands for a name, in keys, and in texts that are their values.
+        names: the names; without any, entries stay as they are.
+        table: by texts that may have the star.
+
+    """
+    replaced = {
+        key.replace(star, name): value.replace(star, name) if isinstance(value, str) else value
+        for name in names
+        for key, value in table.items()
+        if star in key
+    }
+    return replaced | {key: value for key, value in table.items() if star not in key or not names}
+
+
+def role_of(component: str) -> str:
+    """The name of a component in its innermost system."""
+    return component.rpartition(".")[2]
+
+
 @dataclass(frozen=True)
 class Inputs:
     """A table of inputs, as a scenario or the command line names it.
@@ -725,26 +748,3 @@ ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
     "reset": _reset,
     "stop": lambda _, __: Stop("stop"),
 }
-
-
-def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table with an entry for each name in the place of one with a star; others win.
-
-    Args:
-        star: that stands for a name, in keys, and in texts that are their values.
-        names: that it stands for.
-        table: by texts that may have it.
-
-    """
-    found = {
-        key.replace(star, name): value.replace(star, name) if isinstance(value, str) else value
-        for name in names
-        for key, value in table.items()
-        if star in key
-    }
-    return found | {key: value for key, value in table.items() if star not in key or not names}
-
-
-def role_of(component: str) -> str:
-    """What a component is called in its innermost system."""
-    return component.rpartition(".")[2]
