@@ -16,16 +16,16 @@ from orchestrator.cosim.observers.observer import CBlock
 from orchestrator.cosim.schedule import Member, Stage
 from orchestrator.cosim.stages import Decimation
 from orchestrator.machine.cache import users_folder
-from orchestrator.machine.compilers import FLAGS
-from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.libraries import (
+from orchestrator.machine.compilers import (
+    FLAGS,
     compile_library,
     find_compiler,
-    find_fast_compiler,
     find_library,
     library_key,
     load_library,
+    own_compiler,
 )
+from orchestrator.machine.errors import InputError, reason
 
 SOURCE = Path(__file__).with_name("stepper.c")
 
@@ -185,7 +185,7 @@ def compile_stepper(in_no_time: bool = False) -> CDLL:
         InputError: it cannot be; the text says what to do.
 
     """
-    compiler = find_fast_compiler() if in_no_time else find_compiler()
+    compiler = own_compiler() if in_no_time else find_compiler()
     if compiler is None:
         raise InputError(
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"

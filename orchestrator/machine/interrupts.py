@@ -11,8 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from orchestrator.machine.disk import is_still
-from orchestrator.machine.operating_system import never_wait_for_pipe
+from orchestrator.machine.operating_system import is_still, never_wait_for_pipe
 
 #: Ctrl-C, what a batch system sends, the end of the terminal, and Ctrl-Break of Windows.
 _STOPS = [

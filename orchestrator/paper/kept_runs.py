@@ -16,9 +16,8 @@ from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import code_of, digest_of
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.ledger import Ledger
 from orchestrator.machine.workers import Workers
-from orchestrator.runs.folder import open_ledger
+from orchestrator.runs.folder import Ledger, open_ledger
 from orchestrator.runs.preparation import Prepared, prepare_request
 from orchestrator.runs.record import content_of, ending_in, header_in, loops_in
 from orchestrator.runs.request import Request

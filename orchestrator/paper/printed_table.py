@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from auv_fmu.paper.euler import STEP
-from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import workers
 from orchestrator.paper.choices import (
     AGAINST_FIVE,
@@ -33,7 +32,7 @@ from orchestrator.paper.variants import (
     Variant,
     all_variants,
 )
-from orchestrator.runs.folder import replace_files
+from orchestrator.runs.folder import RECORD, replace_files
 from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.vehicle.index.tracking import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES

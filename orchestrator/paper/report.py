@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from fmus.kinds import AUTO, KindName
-from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
 from orchestrator.paper import printed_table
 from orchestrator.paper.claims import CLAIMS
@@ -28,7 +27,7 @@ from orchestrator.paper.sections import (
 )
 from orchestrator.paper.variants import all_variants
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.folder import inner_folder, replace_files
+from orchestrator.runs.folder import RECORD, inner_folder, replace_files
 from orchestrator.runs.record import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.proof import gain_check

@@ -24,9 +24,8 @@ from orchestrator.cosim.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
 from orchestrator.machine.children import listen_to_module
 from orchestrator.machine.compilers import compiler_for
-from orchestrator.machine.disk import hold_lock, process_folder
+from orchestrator.machine.disk import hold_lock, process_folder, sha256_of
 from orchestrator.machine.errors import InputError, last_line, reason
-from orchestrator.machine.ledger import sha256_of
 from orchestrator.machine.platforms import platforms
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop

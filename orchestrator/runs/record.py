@@ -31,8 +31,8 @@ from orchestrator.cosim.system.values import TYPES, Standing, StringTable
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.ledger import RECORD, is_changed, locate
 from orchestrator.machine.user_files import explain_errors, read_text
+from orchestrator.runs.folder import RECORD, is_changed, locate
 from orchestrator.runs.preparation import Prepared
 from orchestrator.vehicle.signals import STANDARD, Loop, loop_of
 

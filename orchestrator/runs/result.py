@@ -21,8 +21,7 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.machine.ledger import locate
-from orchestrator.runs.folder import replace_files
+from orchestrator.runs.folder import locate, replace_files
 from orchestrator.runs.record import (
     FILES,
     METRICS,

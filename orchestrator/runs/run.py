@@ -33,8 +33,15 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
-from orchestrator.machine.ledger import LEDGER, Ledger
-from orchestrator.runs.folder import INCOMPLETE, inner_folder, place_of, publish, replace_files
+from orchestrator.runs.folder import (
+    INCOMPLETE,
+    LEDGER,
+    Ledger,
+    inner_folder,
+    place_of,
+    publish,
+    replace_files,
+)
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.record import (
     CHECKPOINTS,
@@ -316,7 +323,7 @@ class _Unfinished:
             )
         self._spare.unlink()
         self._write_ends(self._done)
-        return place_of(self._path, self._folder)
+        return place_of(Ledger(self._folder))
 
     def _give_up(self, run: _Running) -> None:
         """Keep what is there and end the process; the thread that steps the FMUs never will."""

@@ -16,8 +16,8 @@ from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, LoopName
 from orchestrator.cosim.observers.observer import Observer, Progress
 from orchestrator.cosim.system.structure import System
-from orchestrator.machine.errors import InputError, reason
-from orchestrator.runs.folder import lock_folder, make_folder
+from orchestrator.machine.errors import InputError
+from orchestrator.runs.folder import locked_folder
 from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.record import (
@@ -197,8 +197,5 @@ def _checkpoints(
     if folder is None or (every is None and not resume):
         raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
     place = Path(folder)
-    try:
-        with make_folder(place), lock_folder(place):
-            yield checkpoints_of([prepared], [place], every, resume)
-    except OSError as error:
-        raise InputError(f"cannot write into {place}: {reason(error)}") from error
+    with locked_folder(place):
+        yield checkpoints_of([prepared], [place], every, resume)

@@ -14,12 +14,14 @@ from fmus.ports.reducer import Reducer
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.plan import code_of
 from orchestrator.cosim.system.values import Value
-from orchestrator.machine.compilers import EXPORTED, FLAGS, MATHEMATICS
-from orchestrator.machine.libraries import (
+from orchestrator.machine.compilers import (
+    EXPORTED,
+    FLAGS,
+    MATHEMATICS,
     compile_text,
-    find_fast_compiler,
     library_key,
     load_library,
+    own_compiler,
 )
 
 #: Category in the cache.
@@ -79,7 +81,7 @@ def _compiled(reducer: Reducer) -> bytes:
         OSError: it cannot be.
 
     """
-    compiler, text = find_fast_compiler(), _text(reducer)
+    compiler, text = own_compiler(), _text(reducer)
     if compiler is None or text is None:
         raise OSError(f"{reducer.name} cannot be compiled")
     return compile_text(compiler, text, *_OPTIONS)

@@ -29,9 +29,8 @@ from orchestrator.cosim.fmi.instance import Log
 from orchestrator.cosim.hooks.hook import NEVER, Lasting, Run
 from orchestrator.cosim.observers.observer import Ending, Header, NotKept
 from orchestrator.cosim.plan import Identity, differences
-from orchestrator.machine.disk import sealed, unsealed, write_whole
+from orchestrator.machine.disk import move_aside, sealed, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.ledger import move_aside
 from orchestrator.machine.operating_system import sync_to_disk
 
 #: The file that grows, and the one that is replaced.

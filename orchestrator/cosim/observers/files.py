@@ -14,7 +14,7 @@ import numpy as np
 
 from orchestrator.cosim.formats.tables import ROWS_AT_ONCE, parquet
 from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.machine.disk import is_still
+from orchestrator.machine.operating_system import is_still
 
 #: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
 #: are written at once.

@@ -18,7 +18,7 @@ from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.drawing import save
-from orchestrator.machine.libraries import find_compiler
+from orchestrator.machine.compilers import find_compiler
 from support.tiers import slow
 
 
