@@ -22,7 +22,7 @@ from fmus.discovery import fingerprint
 from fmus.kinds import AUTO, CONTAINED, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.cosim.formats.ssp.writer import ssp_bytes
 from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
-from orchestrator.machine.children import listen_to_module
+from orchestrator.machine.children import run_module
 from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.disk import hold_lock, process_folder, sha256_of
 from orchestrator.machine.errors import InputError, last_line, reason
@@ -218,7 +218,7 @@ def run_fmus(
 
     """
     try:
-        process = listen_to_module(hear, f"fmus.{module}", "--out", str(folder), *options)
+        process = run_module(f"fmus.{module}", "--out", str(folder), *options, hear=hear)
     except OSError as error:
         raise InputError(f"the FMUs cannot be built: {reason(error)}") from error
     if process.returncode != 0:

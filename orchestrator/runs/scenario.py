@@ -35,8 +35,8 @@ from orchestrator.cosim.system.values import (
     typed,
 )
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.user_files import explain_errors, find_toml, names_in, read_text
-from orchestrator.runs import SCENARIOS_FOLDER
+from orchestrator.machine.user_files import explain_errors, read_text
+from orchestrator.runs import SCENARIOS_FOLDER, find_toml, names_in
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
 #: What a message calls a file that cannot be read.
