@@ -26,7 +26,7 @@ from fmus.discovery import (
 from fmus.kinds import PYTHON
 from fmus.python.modules import modules_of, with_other_imports
 from fmus.script import data_files, import_from, no_component
-from orchestrator.machine.compilers import Compiler, own_compiler
+from orchestrator.machine.compilers import Compiler, compile_library, own_compiler
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
@@ -134,14 +134,11 @@ def compiled_loader() -> bytes:
     compiler = loader_compiler()
     if compiler is None:
         raise OSError("the native loader needs Linux and a C compiler; build with --loader plain")
-    with TemporaryDirectory(prefix="auv_fmu_loader_") as folder:
-        library = Path(folder, "loader.so")
-        options = ["-O2", "-s", "-Wl,--build-id=none", "-o", str(library)]
-        try:
-            compiler.run(*options, *LOADER_FLAGS, folder=LOADER)
-        except OSError as error:
-            raise OSError(f"the native loader does not compile: {error}") from error
-        return library.read_bytes()
+    options = ["-O2", "-s", "-Wl,--build-id=none", *LOADER_FLAGS]
+    try:
+        return compile_library(compiler, *options, folder=LOADER)
+    except OSError as error:
+        raise OSError(f"the native loader does not compile: {error}") from error
 
 
 def _with_loader(entries: dict[str, bytes]) -> dict[str, bytes]:

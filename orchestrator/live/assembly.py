@@ -15,7 +15,6 @@ from base64 import b64encode
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from fmus.discovery import licences
 from fmus.kinds import NATIVE
@@ -23,7 +22,7 @@ from orchestrator.live.module import LICENCES as MODULE_LICENCES
 from orchestrator.live.module import MODULE, live_module
 from orchestrator.live.presets import page_data
 from orchestrator.machine.cache import made_once
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 
 #: Category in the cache.
@@ -144,8 +143,8 @@ def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]
             "https://nodejs.org"
         )
     hear("bundling the script of the page with npm (only once): this may take a minute")
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        folder = Path(temporary, WEB.name)
+    with temporary_folder() as temporary:
+        folder = temporary / WEB.name
         for path in _sources():
             target = folder / path.relative_to(WEB)
             target.parent.mkdir(parents=True, exist_ok=True)

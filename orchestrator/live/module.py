@@ -10,13 +10,12 @@ from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from fmus.discovery import package_folder
 from orchestrator.live.programs import Source
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.compilers import SAME_NUMBERS, zig
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, reason
 
 #: Category in the cache.
@@ -98,8 +97,7 @@ def compiled(
             "pip install 'auv-fmu[native]'"
         )
     hear("compiling the page's programs to WebAssembly (only once): this may take a minute")
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        folder = Path(temporary)
+    with temporary_folder() as folder:
 
         def compile_source(name: str) -> str:
             made, (text, called, others) = f"{name}.o", sources[name]

@@ -15,10 +15,10 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 from subprocess import PIPE, CompletedProcess, Popen
-from tempfile import TemporaryDirectory, TemporaryFile
+from tempfile import TemporaryFile
 from typing import Any
 
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import process_folder, temporary_folder
 from orchestrator.machine.operating_system import wait_for_end
 
 
@@ -82,13 +82,13 @@ def _tie() -> Iterator[dict[str, Any]]:
     # The child reads from a pipe of which only this process has the other end.
     end_of_child, end_of_ours = os.pipe()
     try:
-        with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+        with temporary_folder() as temporary:
             yield {
                 "stdin": end_of_child,
                 "encoding": "utf-8",
                 "errors": "replace",
                 # Windows would choose a code page, which has few letters for the names of files.
-                "env": os.environ | {"TMPDIR": temporary, "PYTHONIOENCODING": "utf-8"},
+                "env": os.environ | {"TMPDIR": str(temporary), "PYTHONIOENCODING": "utf-8"},
             }
     finally:
         os.close(end_of_child)

@@ -15,11 +15,10 @@ from functools import cache
 from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
 from orchestrator.machine.cache import category_folder, read_cached, write_cached
-from orchestrator.machine.disk import hold_lock, process_folder
+from orchestrator.machine.disk import hold_lock, temporary_folder
 from orchestrator.machine.platforms import TARGETS, Platform, library_ending, this_machine
 
 #: C compilers: the first one that there is, is taken.
@@ -184,28 +183,30 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
 
 @cache
 def _version_of(command: str) -> str:
-    return Compiler([command]).run("--version").partition("\n")[0] or command
+    with suppress(OSError):
+        return Compiler([command]).run("--version").partition("\n")[0] or command
+    return command
 
 
 @contextmanager
 def _written(sources: Mapping[str, bytes]) -> Iterator[Path]:
     """Write sources, by the names of their files, into a temporary folder."""
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+    with temporary_folder() as folder:
         for file, content in sources.items():
-            Path(temporary, file).write_bytes(content)
-        yield Path(temporary)
+            (folder / file).write_bytes(content)
+        yield folder
 
 
-def compile_library(compiler: Compiler, *arguments: str) -> bytes:
-    """Compile a library of sources and options, and return its bytes.
+def compile_library(compiler: Compiler, *arguments: str, folder: Path | None = None) -> bytes:
+    """Compile a library of sources and options in a folder, and return its bytes.
 
     Raises:
         OSError: it cannot be; the text is the first error.
 
     """
-    with _written({}) as folder:
-        compiler.run(*arguments, "-o", str(folder / "library"))
-        return (folder / "library").read_bytes()
+    with temporary_folder() as temporary:
+        compiler.run(*arguments, "-o", str(temporary / "library"), folder=folder)
+        return (temporary / "library").read_bytes()
 
 
 def compile_text(compiler: Compiler, text: str, *options: str) -> bytes:
@@ -250,12 +251,7 @@ def library(
 
 
 def check_sources(name: str, sources: Mapping[str, bytes], main: str) -> None:
-    """Check the sources of a library with this machine's compiler, if it has one.
-
-    Args:
-        name: of the library.
-        sources: by the names of their files.
-        main: the one that is compiled and includes the others.
+    """Check sources as for :func:`library`, with this machine's compiler, if it has one.
 
     Raises:
         OSError: it finds a mistake.
@@ -270,25 +266,12 @@ def check_sources(name: str, sources: Mapping[str, bytes], main: str) -> None:
 
 
 def library_key(*made_of: str, machine: str | None = None) -> str:
-    """Return the key of a library in the cache.
-
-    Args:
-        made_of: its text and its options.
-        machine: that it is for; None: this one.
-
-    """
+    """Return the key of a library in the cache: of its text, its options and its machine."""
     return sha256("\0".join((*made_of, machine or this_machine())).encode()).hexdigest()[:24]
 
 
 def find_library(category: str, key: str, function: str) -> CDLL | None:
-    """Load a library from the cache; None: there is none that has a function.
-
-    Args:
-        category: in the cache.
-        key: in the category.
-        function: that it must have.
-
-    """
+    """Load a library from the cache; None: there is none that has the function."""
     with suppress(OSError):
         for place in read_cached(category, key):
             found = CDLL(str(place))
@@ -298,13 +281,7 @@ def find_library(category: str, key: str, function: str) -> CDLL | None:
 
 
 def load_library(category: str, key: str, function: str, make: Callable[[], bytes]) -> CDLL:
-    """Load a library, which is made and kept if it is not in the cache.
-
-    Args:
-        category: in the cache.
-        key: in the category.
-        function: that it must have.
-        make: gives its bytes.
+    """Load a library from the cache; if it is not there, `make` gives its bytes, which are kept.
 
     Raises:
         OSError: it cannot be written, or not be loaded.

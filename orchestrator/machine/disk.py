@@ -163,6 +163,13 @@ def _lock_of(folder: Path) -> BaseFileLock:
     return FileLock(folder / LOCK, thread_local=False)
 
 
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Provide a temporary folder for the context, which goes even if the process is killed."""
+    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
+
+
 def process_folder() -> Path:
     """Return the temporary folder of this process, which is removed when the process ends."""
     with _MAKING:
