@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 LOCK = ".auv-fmu.lock"
 
 #: Errors of file systems without locks.
-_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP)
+_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
 
 #: Entry of a record with its checksum.
 _SEAL = "sha256"
@@ -142,25 +142,31 @@ def hold_lock(folder: Path, wait: bool = False) -> Iterator[None]:
     try:
         yield
     finally:
-        with suppress(OSError):
-            # Where the name is a file of the user's, it stays.
-            if lock_file_is_ours(folder / LOCK):
-                (folder / LOCK).unlink()
+        # While it is locked: later, it could be another process's.
+        is_open = not _remove_lock(folder / LOCK)
         with suppress(OSError):
             # An FMU may have closed its descriptor.
             lock.release()
+        if is_open:
+            _remove_lock(folder / LOCK)
 
 
-def lock_file_is_ours(path: Path) -> bool:
-    """Whether a file is an empty one, as locks need them."""
-    return path.is_file() and not path.is_symlink() and not path.stat().st_size
+def _remove_lock(path: Path) -> bool:
+    """Remove a lock file, unless the user has written into it; False: Windows says it is open."""
+    with suppress(FileNotFoundError):
+        try:
+            if path.is_file() and not path.is_symlink() and not path.stat().st_size:
+                path.unlink()
+        except PermissionError:
+            return False
+    return True
 
 
 def _lock_of(folder: Path) -> BaseFileLock:
     # Slow to import.
     from filelock import FileLock  # noqa: PLC0415
 
-    return FileLock(folder / LOCK, thread_local=False)
+    return FileLock(folder / LOCK, thread_local=False, preserve_lock_file=True)
 
 
 @contextmanager

@@ -76,7 +76,7 @@ class Ledger:
             force: move aside files of the user's that are in the way.
 
         Raises:
-            Taken: a file that is no ledger has its name, and `force` is false.
+            Taken: there is such a file, or the ledger is damaged, and `force` is false.
 
         """
         self.folder, self._force, self._path = folder, force, folder / LEDGER
@@ -233,8 +233,7 @@ class Ledger:
                 if is_out and not (_has_link(self.staging, name) or (self.staging / name).exists()):
                     _move(self.folder / name, self.staging / name)
             for name in _files_in(self.staging / _EARLIER):
-                while taken := self._taken(name):
-                    move_aside(taken)
+                self.check([name])
                 _move(self.staging / _EARLIER / name, self.folder / name)
             rmtree(self.staging / _EARLIER, ignore_errors=True)
         self.moving = {}

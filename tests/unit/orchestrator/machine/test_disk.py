@@ -100,6 +100,21 @@ def test_a_file_of_the_users_that_is_called_like_a_lock_stays(tmp_path: Path, co
     assert not content or (tmp_path / LOCK).read_bytes() == content
 
 
+def test_a_lock_that_cannot_be_removed_while_it_is_open_is_removed_then(tmp_path, monkeypatch):
+    """As on Windows."""
+    unlink, opened = Path.unlink, [True]
+
+    def as_windows(path: Path, **options: bool) -> None:
+        if opened and opened.pop():
+            raise PermissionError(errno.EACCES, "in use", str(path))
+        unlink(path, **options)
+
+    monkeypatch.setattr(Path, "unlink", as_windows)
+    with hold_lock(tmp_path):
+        assert (tmp_path / LOCK).exists()
+    assert not opened and not (tmp_path / LOCK).exists()
+
+
 def test_no_lock_is_taken_by_a_link(tmp_path: Path):
     (tmp_path / "precious").touch()
     (tmp_path / "r").mkdir()
@@ -110,7 +125,7 @@ def test_no_lock_is_taken_by_a_link(tmp_path: Path):
     assert (tmp_path / "r" / LOCK).is_symlink()
 
 
-@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOTSUP])
+@pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS])
 def test_where_there_are_no_locks_nobody_is_kept_out(tmp_path: Path, monkeypatch, number):
     def cannot(*_: object) -> None:
         raise OSError(number, os.strerror(number))
