@@ -5,7 +5,7 @@ from __future__ import annotations
 import signal
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -199,3 +199,6 @@ def _checkpoints(
     place = Path(folder)
     with locked_folder(place):
         yield checkpoints_of([prepared], [place], every, resume)
+    with suppress(OSError):
+        # Fails if it is not empty. The lock was in it when the checkpoint was removed.
+        place.rmdir()
