@@ -89,7 +89,7 @@ def write(source: Source, folder: Path) -> None:
 
     """
     for fmi in FMI_VERSIONS:
-        entries = fmu_entries(source, fmi, (), Compiler("none", (), {}), print)
+        entries = fmu_entries(source, fmi, (), Compiler((), label="none"), print)
         head = "sources/"
         texts = {
             name.removeprefix(head): text for name, text in entries.items() if name.startswith(head)

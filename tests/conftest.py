@@ -156,7 +156,7 @@ def release(shared: Path) -> dict[str, Path]:
     """What the archives of a release unpack to, by versions of FMI; to be read only."""
     folder = shared / "release"
     folder.mkdir(exist_ok=True)
-    with hold_lock(folder, wait=True):
+    with hold_lock(shared, wait=True):
         if not any(folder.iterdir()):
             for archive in write_release(folder / "archives", print):
                 shutil.unpack_archive(archive, folder)

@@ -26,7 +26,7 @@ from fmus.discovery import (
 from fmus.kinds import PYTHON
 from fmus.python.modules import modules_of, with_other_imports
 from fmus.script import data_files, import_from, no_component
-from orchestrator.machine.compilers import machines_compiler, run_compiler
+from orchestrator.machine.compilers import Compiler, compile_library, own_compiler
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
@@ -118,9 +118,9 @@ def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> d
 # The loader
 
 
-def loader_compiler() -> str | None:
+def loader_compiler() -> Compiler | None:
     """The C compiler, if this is a platform that the loader is for and there is one."""
-    return machines_compiler() if sys.platform.startswith("linux") else None
+    return own_compiler() if sys.platform.startswith("linux") else None
 
 
 @cache
@@ -131,17 +131,14 @@ def compiled_loader() -> bytes:
         OSError: there is no compiler, or it fails.
 
     """
-    command = loader_compiler()
-    if command is None:
+    compiler = loader_compiler()
+    if compiler is None:
         raise OSError("the native loader needs Linux and a C compiler; build with --loader plain")
-    with TemporaryDirectory(prefix="auv_fmu_loader_") as folder:
-        library = Path(folder, "loader.so")
-        process = run_compiler(
-            [command, "-O2", "-s", "-Wl,--build-id=none", "-o", str(library), *LOADER_FLAGS], LOADER
-        )
-        if process.returncode != 0:
-            raise OSError(f"the native loader does not compile: {process.stderr.strip()}")
-        return library.read_bytes()
+    options = ["-O2", "-s", "-Wl,--build-id=none", *LOADER_FLAGS]
+    try:
+        return compile_library(compiler, *options, folder=LOADER)
+    except OSError as error:
+        raise OSError(f"the native loader does not compile: {error}") from error
 
 
 def _with_loader(entries: dict[str, bytes]) -> dict[str, bytes]:

@@ -6,8 +6,7 @@ import argparse
 import tomllib
 
 from orchestrator.commands.streams import OK, describe, show
-from orchestrator.machine.user_files import names_in
-from orchestrator.runs import SCENARIOS_FOLDER
+from orchestrator.runs import SCENARIOS_FOLDER, names_in
 
 
 def add_list(parser: argparse.ArgumentParser) -> None:

@@ -23,16 +23,16 @@ from orchestrator.cosim.hooks.hook import Run
 from orchestrator.cosim.observers.observer import CBlock
 from orchestrator.cosim.stages import Decimation, LinkedStage, Member, make_stages
 from orchestrator.machine.cache import users_folder
-from orchestrator.machine.compilers import FLAGS
-from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.libraries import (
+from orchestrator.machine.compilers import (
+    FLAGS,
     compile_library,
     find_compiler,
-    find_fast_compiler,
     find_library,
     library_key,
     load_library,
+    own_compiler,
 )
+from orchestrator.machine.errors import InputError, reason
 
 #: Loops that can be asked for; the first is the default.
 LoopName: TypeAlias = Literal["auto", "python", "compiled"]
@@ -259,7 +259,7 @@ def compile_stepper(in_no_time: bool = False) -> CDLL:
         InputError: it cannot be; the text says what to do.
 
     """
-    compiler = find_fast_compiler() if in_no_time else find_compiler()
+    compiler = own_compiler() if in_no_time else find_compiler()
     if compiler is None:
         raise InputError(
             "the compiled loop needs a C compiler: install gcc or clang, or `pip install ziglang`"

@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from string import Template
-from tempfile import TemporaryDirectory
 
 from auv_fmu import __version__
 from fmus.discovery import REFERENCE, components, licences, package_folder, source_of, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.platforms import platforms
 from orchestrator.runs.bundle import ARCHIVE, build_bundle, write_checksums
 from orchestrator.runs.folder import replace_files
@@ -52,8 +51,8 @@ def write_release(folder: Path, hear: Callable[[str], None], *, force: bool = Fa
     written = [f"{name}.zip" for name in names.values()]
     with replace_files(folder, written, force=force) as unfinished:
         for fmi, name in names.items():
-            with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-                contents = _contents(Path(temporary), fmi, hear)
+            with temporary_folder() as temporary:
+                contents = _contents(temporary, fmi, hear)
                 entries = {f"{name}/{file}": content for file, content in contents}
                 write_archive(unfinished / f"{name}.zip", entries)
     return [folder / name for name in written]

@@ -16,7 +16,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from hashlib import sha256
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 from auv_fmu.language.quantities import POSITION, TAU, THETA, VELOCITY
@@ -24,7 +23,7 @@ from fmus.discovery import licences
 from fmus.kinds import NATIVE
 from orchestrator.figures.style import FIN, RINGS, printed_unit
 from orchestrator.machine.cache import made_once
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, last_line, reason
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.indices import metrics
@@ -193,8 +192,8 @@ def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]
             "the page needs Node.js 20 or later with npm to bundle its script: https://nodejs.org"
         )
     hear("bundling the script of the page with npm (only once): this may take a minute")
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        folder = Path(temporary, WEB.name)
+    with temporary_folder() as temporary:
+        folder = temporary / WEB.name
         for path in _sources():
             target = folder / path.relative_to(WEB)
             target.parent.mkdir(parents=True, exist_ok=True)

@@ -6,20 +6,17 @@ The functions of each have its name before theirs.
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
-from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from fmus.discovery import package_folder
 from orchestrator.live.programs import Source
 from orchestrator.machine.cache import made_once
-from orchestrator.machine.compilers import LIMIT_OF_ZIG, SAME_NUMBERS, run_compiler
-from orchestrator.machine.disk import process_folder
-from orchestrator.machine.errors import InputError, last_line, reason
+from orchestrator.machine.compilers import SAME_NUMBERS, zig
+from orchestrator.machine.disk import temporary_folder
+from orchestrator.machine.errors import InputError, reason
 
 #: Category in the cache.
 CATEGORY = "live-module"
@@ -93,26 +90,27 @@ def compiled(
         OSError: ziglang fails.
 
     """
-    if find_spec("ziglang") is None:
+    compiler = zig(*_TARGET)
+    if compiler is None:
         raise InputError(
             "the live page needs ziglang, which compiles C to WebAssembly: "
             "pip install 'auv-fmu[native]'"
         )
     hear("compiling the page's programs to WebAssembly (only once): this may take a minute")
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        folder = Path(temporary)
+    with temporary_folder() as folder:
 
         def compile_source(name: str) -> str:
             made, (text, called, others) = f"{name}.o", sources[name]
             (folder / f"{name}.c").write_text(text, encoding="utf-8")
             names = (f"-D{one}={name}_{one}" for one in (*called, *others))
-            _zig(folder, *_FLAGS, *_SHARED, *names, "-c", f"{name}.c", "-o", made)
+            options = [*_FLAGS, *_SHARED, *names]
+            compiler.run(*options, "-c", f"{name}.c", "-o", made, folder=folder)
             return made
 
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             objects = list(pool.map(compile_source, sources))
         exports = [f"-Wl,--export={name}" for name in _exports(sources)]
-        _zig(folder, *_LINKED, *exports, *objects, "-o", MODULE)
+        compiler.run(*_LINKED, *exports, *objects, "-o", MODULE, folder=folder)
         return {MODULE: (folder / MODULE).read_bytes(), LICENCES: _licences().encode()}
 
 
@@ -123,14 +121,6 @@ def _licences() -> str:
         + (folder / path).read_text(encoding="utf-8").strip()
         for name, path in _NOTICES.items()
     )
-
-
-def _zig(folder: Path, *arguments: str) -> None:
-    command = [sys.executable, "-m", "ziglang", "cc", *_TARGET, *arguments]
-    process = run_compiler(command, folder, LIMIT_OF_ZIG)
-    if process.returncode != 0:
-        errors = [line for line in process.stderr.splitlines() if "error" in line]
-        raise OSError(f"ziglang: {(errors or [last_line(process.stderr)])[0]}")
 
 
 def _exports(sources: Mapping[str, Source]) -> Iterator[str]:

@@ -1,9 +1,9 @@
 """Libraries, machine code and FMUs, made once and kept in the user's cache folder.
 
 All of it is run, so it is taken only from folders and files that nobody but the user can write,
-and only if unchanged since it was kept: the digests of its files are in a separate folder. Nothing
-there is ever overwritten or removed. Anything that has changed is made anew, under another name.
-What came with the installation, ready for use, is taken first, and trusted like the code beside it.
+and only if it is unchanged. Nothing there is ever overwritten or removed: what was changed is made
+anew, under another name. What came with the installation, ready for use, is taken first, and
+trusted like the code beside it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from multiprocessing import parent_process
 from pathlib import Path
 from shutil import rmtree
 from stat import S_ISDIR, S_ISLNK, S_ISREG, S_ISVTX
-from tempfile import mkdtemp, mkstemp
+from tempfile import mkdtemp
 
 from platformdirs import user_cache_path
 
@@ -28,20 +28,17 @@ from orchestrator.machine.operating_system import is_mine, others_write, sync_to
 #: What came with the installation: a folder for each category, in it one for each key.
 _READY = Path(__file__).parents[1] / "ready"
 
-#: The folder of the digests, beside one for each category of what is kept.
-_DIGESTS = "digests"
-
-#: Links in a path, as many as Linux follows.
-_MOST_LINKS = 40
+#: The file beside those that are kept, with their digests. Written last: where it is, all are.
+_DIGESTS = ".sha256.json"
 
 
 def users_folder() -> Path:
-    """The user's cache folder, even one that others can write into."""
+    """Return the user's cache folder, even if others can write into it."""
     return user_cache_path("auv-fmu", appauthor=False)
 
 
 def read_cached(category: str, key: str) -> dict[Path, bytes]:
-    """Read the files that are there under a key; empty if they are not as they were kept.
+    """Read the files that are kept under a key; none if they are not as they were kept.
 
     Args:
         category: of what is kept, a name of a folder.
@@ -50,21 +47,39 @@ def read_cached(category: str, key: str) -> dict[Path, bytes]:
     """
     with suppress(OSError):
         return {path: path.read_bytes() for path in sorted((_READY / category / key).iterdir())}
-    root = _root(category)
     with suppress(OSError):
-        for record in sorted((root / _DIGESTS).glob(f"{category}-{key}-*.json")):
-            if found := _files(root / category, record):
+        for folder in sorted((_root(category) / category).glob(f"{key}-*")):
+            if found := _kept_in(folder):
                 return found
     return {}
 
 
-def made_once(category: str, key: str, make: Callable[[], Mapping[str, bytes]]) -> dict[str, Path]:
-    """The places of files by their names, which are made and kept if they are not there.
+def write_cached(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
+    """Keep files, given by their names, under a key, and return their paths.
 
-    Args:
-        category: of what is kept, a name of a folder.
-        key: of all that they are made of.
-        make: gives their contents.
+    Raises:
+        OSError: they cannot be written.
+
+    """
+    folder = Path(mkdtemp(prefix=f"{key}-", dir=category_folder(category)))
+    digests = {name: sha256(content).hexdigest() for name, content in files.items()}
+    try:
+        folder.chmod(0o700)
+        for name, content in {**files, _DIGESTS: json.dumps(digests).encode()}.items():
+            descriptor = os.open(folder / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+            with open(descriptor, "wb") as file:  # noqa: PTH123
+                file.write(content)
+                file.flush()
+                os.fsync(descriptor)
+        sync_to_disk(folder)
+    except BaseException:
+        rmtree(folder, ignore_errors=True)
+        raise
+    return [folder / name for name in files]
+
+
+def made_once(category: str, key: str, make: Callable[[], Mapping[str, bytes]]) -> dict[str, Path]:
+    """Return the paths of files by their names; they are made and kept if they are not there.
 
     Raises:
         OSError: they cannot be written.
@@ -78,102 +93,56 @@ def made_once(category: str, key: str, make: Callable[[], Mapping[str, bytes]]) 
     return {path.name: path for path in found}
 
 
-def environment() -> dict[str, str]:
-    """What the environment of processes shall have that work for this one."""
-    root = _root(_DIGESTS)
-    return {} if root == users_folder() else {"XDG_CACHE_HOME": str(root.parent)}
-
-
 def category_folder(category: str) -> Path:
-    """Give the folder of a category, made if it is not there.
+    """Return the folder of a category, made if it is not there.
 
     Raises:
         OSError: it cannot be made.
 
     """
-    return _made(category) / category
+    while True:
+        root = _root(category)
+        _make(root / category)
+        # Another user may have been first.
+        if _root(category) == root:
+            return root / category
 
 
-def write_cached(category: str, key: str, files: Mapping[str, bytes]) -> list[Path]:
-    """Keep files, and give their paths.
+def environment() -> dict[str, str]:
+    """Return what processes that work for this one need in their environment."""
+    root = _root("")
+    return {} if root == users_folder() else {"XDG_CACHE_HOME": str(root.parent)}
 
-    Args:
-        category: of what is kept, a name of a folder.
-        key: of all that it was made of.
-        files: by their names.
 
-    Raises:
-        OSError: they cannot be written.
-
-    """
-    root = _made(category)
-    made = Path(mkdtemp(prefix=f"{key}-", dir=root / category))
+def _kept_in(folder: Path) -> dict[Path, bytes]:
+    """Read the files that are kept in a folder; none if one of them is not as it was kept."""
     try:
-        made.chmod(0o700)
-        for name, content in files.items():
-            _write(os.open(made / name, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), content)
-        sync_to_disk(made)
-        digests = {name: sha256(content).hexdigest() for name, content in files.items()}
-        descriptor, record = mkstemp(".json", f"{category}-{key}-", root / _DIGESTS)
-        try:
-            _write(descriptor, json.dumps({"folder": made.name, "sha256": digests}).encode())
-        except BaseException:
-            Path(record).unlink()
-            raise
-    except BaseException:
-        rmtree(made, ignore_errors=True)
-        raise
-    return [made / name for name in files]
-
-
-def _files(folder: Path, record: Path) -> dict[Path, bytes]:
-    """The files that a record tells of; empty if one of them is not as it was kept."""
-    try:
-        content = json.loads(_read(record))
-        name, digests = content["folder"], dict(content["sha256"])
-        if any(Path(part).name != part for part in (name, *digests)):
+        if not _keeps_others_out(folder.lstat(), above=False):
             return {}
-        if not _keeps_others_out((folder / name).lstat(), above=False):
+        digests = dict(json.loads(_read(folder / _DIGESTS)))
+        if any(Path(name).name != name for name in digests):
             return {}
-        found = {folder / name / file: _read(folder / name / file) for file in digests}
-    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        found = {folder / name: _read(folder / name) for name in digests}
+    except (OSError, ValueError, TypeError, RecursionError):
         return {}
-    whole = [sha256(content).hexdigest() for content in found.values()] == [*digests.values()]
-    return found if whole else {}
+    is_whole = [sha256(content).hexdigest() for content in found.values()] == [*digests.values()]
+    return found if is_whole else {}
 
 
 def _read(path: Path) -> bytes:
-    """The content of a file that is the user's.
+    """Read a file that only the user can write.
 
     Raises:
         OSError: it cannot be read, or another user can write it.
 
     """
-    # A FIFO must not hold us up.
+    # A FIFO must not block.
     flags = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     with open(os.open(path, os.O_RDONLY | flags), "rb") as file:  # noqa: PTH123
         status = os.fstat(file.fileno())
         if not S_ISREG(status.st_mode) or not is_mine(status) or others_write(status):
             raise PermissionError(f"{path} belongs to, or is writable by, another user")
         return file.read()
-
-
-def _write(descriptor: int, content: bytes) -> None:
-    with open(descriptor, "wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(descriptor)
-
-
-def _made(category: str) -> Path:
-    """The cache folder, with the folders that are needed in it."""
-    while True:
-        root = _root(category)
-        for folder in (root / category, root / _DIGESTS):
-            _make(folder)
-        # Another user may have been first.
-        if _root(category) == root:
-            return root
 
 
 def _make(folder: Path) -> None:
@@ -186,55 +155,60 @@ def _make(folder: Path) -> None:
 
 
 def _root(category: str) -> Path:
-    """The cache folder: the user's, or one of this process where others could write into that."""
+    """Return the user's cache folder, or one of this process if others could write into that."""
     path = users_folder()
     if not path.is_absolute():
         why = f"{path} is below the current folder: set XDG_CACHE_HOME to an absolute path"
-    elif culprit := _open_to_others(path / category) or _open_to_others(path / _DIGESTS):
+    elif culprit := _open_to_others(path / category, n_within=1 + bool(category)):
         why = (
             f"{culprit} must be a folder that only you can write to: `chmod -R go-w` it, or set "
             "XDG_CACHE_HOME to another"
         )
     else:
         return path
-    # Processes that work for another have nothing to say.
+    # Processes that work for another do not repeat it.
     if parent_process() is None:
         warnings.warn(f"nothing is cached, because {why}", stacklevel=1)
     return process_folder() / path.name
 
 
-def _open_to_others(path: Path) -> Path | None:
-    """The first part of the path of a folder where others could put something of theirs.
+def _open_to_others(path: Path, n_within: int) -> Path | None:
+    """Return the first part of the path of a folder where others could put something of theirs.
 
     Above the cache folder there may be folders of root's and links, and folders such as /tmp, where
     nobody can move what others have.
+
+    Args:
+        path: of the folder.
+        n_within: how many of its last parts are not above the cache folder.
+
     """
-    current, parts, links = Path(path.anchor), list(path.parts[1:]), 0
-    while parts:
-        current /= parts.pop(0)
+    parts = [*reversed(path.parents), path]
+    for i, part in enumerate(parts):
+        above = i < len(parts) - n_within
         try:
-            status = current.lstat()
+            status = part.lstat()
+            if above and S_ISLNK(status.st_mode):
+                if not is_mine(status, or_roots=True):
+                    return part
+                # Fails for links that lead to each other.
+                part.stat()
+                if culprit := _open_to_others(part.parent / part.readlink(), n_within=0):
+                    return culprit
+            elif not _keeps_others_out(status, above):
+                return part
         except OSError:
-            # What is not there we make; what cannot be reached is said when it is written.
+            # What is not there is made; what cannot be reached is said when it is written.
             return None
-        above = len(parts) > 1
-        if above and S_ISLNK(status.st_mode):
-            links += 1
-            if links > _MOST_LINKS or not is_mine(status, or_roots=True):
-                return current
-            target = current.parent / current.readlink()
-            current, parts = Path(target.anchor), [*target.parts[1:], *parts]
-        elif not _keeps_others_out(status, above):
-            return current
     return None
 
 
 def _keeps_others_out(status: os.stat_result, above: bool) -> bool:
-    """Whether what is in a folder is the user's.
+    """Tell whether only the user can change what is in a folder.
 
     Args:
         status: of the folder.
-        above: it is above the cache folder.
+        above: whether it is above the cache folder.
 
     """
     mine = is_mine(status, or_roots=above)

@@ -1,8 +1,7 @@
-"""Child processes that do not outlive this one, and run modules of Python.
+"""Child processes that run modules of Python, and end with this process.
 
-Run as a module, `python -m orchestrator.machine.children MODULE ...`, it is the child: it runs
-another module, and ends with its parent. Nothing here takes code or settings from the current
-folder, which may be someone else's.
+Run as a module, `python -m orchestrator.machine.children MODULE ...`, it is the child. Nothing here
+takes code or settings from the current folder, which may be someone else's.
 """
 
 from __future__ import annotations
@@ -11,26 +10,20 @@ import os
 import runpy
 import sys
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
-from subprocess import PIPE, CompletedProcess, Popen, run
-from tempfile import TemporaryDirectory, TemporaryFile
+from subprocess import PIPE, CompletedProcess, Popen
+from tempfile import TemporaryFile
 from typing import Any
 
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import process_folder, temporary_folder
 from orchestrator.machine.operating_system import wait_for_end
 
 
 def imported_apart(module: str, file: str) -> None:
-    """Import a module now, and elsewhere, if the current folder has a file that it would read.
-
-    Args:
-        module: to be imported.
-        file: that it looks for in the current folder.
-
-    """
+    """Import a module in another folder, if the current one has a file that it would read."""
     if module in sys.modules or not os.path.lexists(file):
         return
     current = Path.cwd()
@@ -42,73 +35,60 @@ def imported_apart(module: str, file: str) -> None:
 
 
 def run_module(
-    module: str, *arguments: str, folder: Path | None = None, timeout: float | None = None
+    module: str,
+    *arguments: str,
+    hear: Callable[[str], None] | None = None,
+    timeout: float | None = None,
 ) -> CompletedProcess[str]:
     """Run a module to its end; an exception here, such as Ctrl-C, ends it at once.
-
-    Without -P it would import from the current folder.
 
     Args:
         module: as after `python -m`.
         arguments: of its command line.
-        folder: that it runs in; None: the current one.
-        timeout: how long it may take [s]; None: without limit.
+        hear: called with each line of its output as it comes.
+        timeout: how long it may take [s], unless it is heard; None: without limit.
 
     Raises:
         TimeoutExpired: it took longer, and was ended.
         OSError: no process can be started.
 
     """
-    with _tie() as tied:
-        command = _command(module, arguments)
-        return run(command, capture_output=True, check=False, cwd=folder, timeout=timeout, **tied)
-
-
-def listen_to_module(
-    hear: Callable[[str], None], module: str, *arguments: str
-) -> CompletedProcess[str]:
-    """Run a module to its end, and hear each line of its output as it comes.
-
-    Raises:
-        OSError: no process can be started.
-
-    """
+    # Without -P it would import from the current folder.
+    command = [sys.executable, "-P", "-m", __name__, module, *arguments]
     with (
         _tie() as tied,
         TemporaryFile("w+", encoding="utf-8", errors="replace") as complaints,
-        Popen(_command(module, arguments), stdout=PIPE, stderr=complaints, **tied) as process,
+        Popen(command, stdout=PIPE, stderr=complaints, **tied) as process,
     ):
         try:
-            assert process.stdout is not None
             lines = []
-            for line in process.stdout:
-                lines.append(line)
-                hear(line.rstrip("\n"))
-            status = process.wait()
+            if hear is not None:
+                assert process.stdout is not None
+                for line in process.stdout:
+                    lines.append(line)
+                    hear(line.rstrip("\n"))
+            rest, _ = process.communicate(timeout=timeout)
         except BaseException:
             process.kill()
             raise
         complaints.seek(0)
-        return CompletedProcess(process.args, status, "".join(lines), complaints.read())
-
-
-def _command(module: str, arguments: Sequence[str]) -> list[str]:
-    return [sys.executable, "-P", "-m", __name__, module, *arguments]
+        output = "".join(lines) + rest
+        return CompletedProcess(process.args, process.returncode, output, complaints.read())
 
 
 @contextmanager
 def _tie() -> Iterator[dict[str, Any]]:
-    """Tie a child to this process, and its temporary files to its end."""
+    """Tie a child to this process, and its temporary files to its own end."""
     # The child reads from a pipe of which only this process has the other end.
     end_of_child, end_of_ours = os.pipe()
     try:
-        with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
+        with temporary_folder() as temporary:
             yield {
                 "stdin": end_of_child,
                 "encoding": "utf-8",
                 "errors": "replace",
                 # Windows would choose a code page, which has few letters for the names of files.
-                "env": os.environ | {"TMPDIR": temporary, "PYTHONIOENCODING": "utf-8"},
+                "env": os.environ | {"TMPDIR": str(temporary), "PYTHONIOENCODING": "utf-8"},
             }
     finally:
         os.close(end_of_child)

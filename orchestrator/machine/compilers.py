@@ -1,4 +1,4 @@
-"""C compilers, and the libraries that they make of the sources of an FMU."""
+"""C compilers, and the libraries that they make: for FMUs, or compiled once and loaded here."""
 
 from __future__ import annotations
 
@@ -8,14 +8,18 @@ import signal
 import struct
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from ctypes import CDLL
+from functools import cache
+from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import NamedTuple
 
-from orchestrator.machine.platforms import TARGETS, Platform, this_machine
+from orchestrator.machine.cache import category_folder, read_cached, write_cached
+from orchestrator.machine.disk import hold_lock, temporary_folder
+from orchestrator.machine.platforms import TARGETS, Platform, library_ending, this_machine
 
 #: C compilers: the first one that there is, is taken.
 COMPILERS = ("cc", "gcc", "clang")
@@ -56,7 +60,7 @@ _ZIG = {machine: ("-target", target) for machine, target in TARGETS.items()}
 _APPLE = {"x86_64-darwin": ("-arch", "x86_64"), "aarch64-darwin": ("-arch", "arm64")}
 
 #: How long this machine's compiler may take [s], and ziglang, which makes a C library, too.
-_LIMIT, LIMIT_OF_ZIG = 120.0, 900.0
+_LIMIT, _LIMIT_OF_ZIG = 120.0, 900.0
 
 #: Universal binaries, as Apple calls libraries for several processors in one file.
 _MAGIC_FAT, _MAGIC_64 = 0xCAFEBABE, 0xFEEDFACF
@@ -67,83 +71,109 @@ _ALIGNMENT = 14
 #: Heads of the file, of a library in it, and of a library.
 _FAT, _ENTRY, _THIN = struct.Struct(">2I"), struct.Struct(">5I"), struct.Struct("<3I")
 
+#: For zig, which else compiles for this very processor.
+ANY_PROCESSOR = "-mcpu=baseline"
+
 
 class Compiler(NamedTuple):
     """A C compiler.
 
     Attributes:
-        name: with its version.
         command: that runs it, with its options.
         targets: its option for each machine, if it makes libraries for several.
-        limit: how long it may take [s].
+        limit: how long it may take [s]; None: as long as this machine's.
+        label: its name with its version; empty: the command is asked.
 
     """
 
-    name: str
     command: Sequence[str]
-    targets: Mapping[str, Sequence[str]]
-    limit: float = _LIMIT
+    targets: Mapping[str, Sequence[str]] = {}
+    limit: float | None = None
+    label: str = ""
+
+    @property
+    def name(self) -> str:
+        """Name with version."""
+        return self.label or _version_of(self.command[0])
+
+    def run(self, *arguments: str, folder: Path | None = None) -> str:
+        """Run it in a folder, None: the current one, and return its output.
+
+        If it takes too long it is ended, with all that it has started.
+
+        Raises:
+            OSError: it fails, and the text is its first error, or it takes too long.
+
+        """
+        limit = _LIMIT if self.limit is None else self.limit
+        # Ctrl-C is for this process only.
+        with subprocess.Popen(
+            [*self.command, *arguments], cwd=folder, stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True,
+        ) as process:  # fmt: skip
+            try:
+                output, complaints = process.communicate(timeout=limit)
+            except BaseException as error:
+                if os.name == "posix":
+                    # After Ctrl-C, Python has waited for it, and it may have ended.
+                    with suppress(ProcessLookupError):
+                        os.killpg(process.pid, signal.SIGKILL)
+                process.kill()
+                if isinstance(error, subprocess.TimeoutExpired):
+                    raise TimeoutError(
+                        f"{self.command[0]} has not ended after {limit:g} s"
+                    ) from None
+                raise
+        if process.returncode != 0:
+            lines = complaints.strip().splitlines() or [f"exit status {process.returncode}"]
+            raise OSError(next((line for line in lines if "error" in line), lines[-1]))
+        return output
 
 
 def machines_compiler() -> str | None:
-    """The C compiler of this machine, if it has one."""
+    """Return the command of this machine's C compiler, if it has one."""
     return next(filter(None, map(shutil.which, COMPILERS)), None)
 
 
-def run_compiler(
-    command: Sequence[str], folder: Path | None = None, limit: float | None = None
-) -> subprocess.CompletedProcess[str]:
-    """Run a C compiler, and end it with all that it has started if it takes too long.
+def own_compiler() -> Compiler | None:
+    """Return this machine's C compiler, if it has one: it takes a tenth of a second, zig some."""
+    command = machines_compiler()
+    return None if command is None else Compiler([command])
 
-    Args:
-        command: with its arguments.
-        folder: that it runs in; None: the current one.
-        limit: how long it may take [s]; None: as long as this machine's.
 
-    Raises:
-        OSError: it takes longer, or cannot be started.
+def find_compiler() -> Compiler | None:
+    """Return a C compiler: this machine's, or else zig; None: there is none."""
+    return own_compiler() or zig()
 
-    """
-    limit = _LIMIT if limit is None else limit
-    # Ctrl-C is for this process only.
-    with subprocess.Popen(
-        command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-        errors="replace", start_new_session=True,
-    ) as process:  # fmt: skip
-        try:
-            said, complaints = process.communicate(timeout=limit)
-        except BaseException as error:
-            if os.name == "posix":
-                # After Ctrl-C, Python has waited for it, and it may have ended.
-                with suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
-            process.kill()
-            if isinstance(error, subprocess.TimeoutExpired):
-                raise TimeoutError(f"{command[0]} has not ended after {limit:g} s") from None
-            raise
-    return subprocess.CompletedProcess(command, process.returncode, said, complaints)
+
+def zig(*options: str) -> Compiler | None:
+    """Return the C compiler of the package ziglang, if it is installed."""
+    if find_spec("ziglang") is None:
+        return None
+    # Slow to import, and the command line always imports this module.
+    from importlib.metadata import version  # noqa: PLC0415
+
+    # Without -P, Python would import from the current folder.
+    command = [sys.executable, "-P", "-m", "ziglang", "cc", *options]
+    return Compiler(command, _ZIG, _LIMIT_OF_ZIG, f"ziglang {version('ziglang')}")
 
 
 def compiler_for(platforms: Sequence[Platform]) -> Compiler:
-    """The one that makes the libraries of all platforms: this machine's own if it can.
+    """Return the compiler for the libraries of all platforms: this machine's own if it can.
 
     Raises:
         OSError: there is none.
 
     """
-    own, machine = machines_compiler(), this_machine()
+    own, machine = own_compiler(), this_machine()
     targets = _APPLE if machine in _APPLE else {}
     can = {machine, *targets}
     others = [platform.name for platform in platforms if not can.issuperset(platform.machines)]
     if own is not None and not others and not machine.endswith("-windows"):
         options = _LINUX if machine.endswith("-linux") else ()
-        return Compiler(_version_of(own), [own, *options], targets)
-    if find_spec("ziglang") is not None:
-        # Slow to import, and the command line always imports this module.
-        from importlib.metadata import version  # noqa: PLC0415
-
-        command = [sys.executable, "-m", "ziglang", "cc"]
-        return Compiler(f"ziglang {version('ziglang')}", command, _ZIG, LIMIT_OF_ZIG)
+        return Compiler([*own.command, *options], targets)
+    if compiler := zig():
+        return compiler
     names = ", ".join(others or [platform.name for platform in platforms])
     remedy = "pip install 'auv-fmu[native]' brings one"
     if not others and machine.endswith("-linux"):
@@ -151,15 +181,49 @@ def compiler_for(platforms: Sequence[Platform]) -> Compiler:
     raise OSError(f"there is no C compiler for {names}: {remedy}")
 
 
+@cache
 def _version_of(command: str) -> str:
-    process = run_compiler([command, "--version"])
-    return process.stdout.partition("\n")[0] or command
+    with suppress(OSError):
+        return Compiler([command]).run("--version").partition("\n")[0] or command
+    return command
+
+
+@contextmanager
+def _written(sources: Mapping[str, bytes]) -> Iterator[Path]:
+    """Write sources, by the names of their files, into a temporary folder."""
+    with temporary_folder() as folder:
+        for file, content in sources.items():
+            (folder / file).write_bytes(content)
+        yield folder
+
+
+def compile_library(compiler: Compiler, *arguments: str, folder: Path | None = None) -> bytes:
+    """Compile a library of sources and options in a folder, and return its bytes.
+
+    Raises:
+        OSError: it cannot be; the text is the first error.
+
+    """
+    with temporary_folder() as temporary:
+        compiler.run(*arguments, "-o", str(temporary / "library"), folder=folder)
+        return (temporary / "library").read_bytes()
+
+
+def compile_text(compiler: Compiler, text: str, *options: str) -> bytes:
+    """Compile a library of the text of one source, and return its bytes.
+
+    Raises:
+        OSError: it cannot be; the text is the first error.
+
+    """
+    with _written({"source.c": text.encode()}) as folder:
+        return compile_library(compiler, str(folder / "source.c"), *options)
 
 
 def library(
     compiler: Compiler, platform: Platform, name: str, sources: Mapping[str, bytes], main: str
 ) -> bytes:
-    """The library of a platform.
+    """Compile the library of a platform.
 
     Args:
         compiler: that can make it.
@@ -172,52 +236,65 @@ def library(
         OSError: the compiler fails.
 
     """
-    with TemporaryDirectory(prefix="auv_fmu_native_") as folder:
-        for file, content in sources.items():
-            Path(folder, file).write_bytes(content)
+    with _written(sources) as folder:
         # A name without a folder, because the library may hold it.
-        made = Path(folder, f"{name}{platform.ending}")
-        libraries = []
+        made, libraries = folder / f"{name}{platform.ending}", []
         for machine in platform.machines:
-            target = compiler.targets.get(machine, ())
             size = _SMALL if machine.endswith("-windows") else _NO_TABLES
-            options = [*target, *FLAGS, *size, "-o", made.name, main, "-lm"]
-            process = run_compiler([*compiler.command, *options], Path(folder), compiler.limit)
-            if process.returncode != 0:
-                raise OSError(
-                    f"{compiler.name} makes no {name} for {machine}: {_complaint(process)}"
-                )
+            options = [*compiler.targets.get(machine, ()), *FLAGS, *size, "-o", made.name]
+            try:
+                compiler.run(*options, main, "-lm", folder=folder)
+            except OSError as error:
+                raise OSError(f"{compiler.name} makes no {name} for {machine}: {error}") from error
             libraries.append(made.read_bytes())
     return libraries[0] if len(libraries) == 1 else universal(libraries)
 
 
 def check_sources(name: str, sources: Mapping[str, bytes], main: str) -> None:
-    """Let this machine's compiler, if it has one, read sources without making a library.
-
-    Args:
-        name: of the library.
-        sources: by the names of their files.
-        main: the one that is compiled and includes the others.
+    """Check sources as for :func:`library`, with this machine's compiler, if it has one.
 
     Raises:
         OSError: it finds a mistake.
 
     """
-    command = machines_compiler()
-    if command is None:
-        return
-    with TemporaryDirectory(prefix="auv_fmu_check_") as folder:
-        for file, content in sources.items():
-            Path(folder, file).write_bytes(content)
-        process = run_compiler([command, *FLAGS, "-fsyntax-only", main], Path(folder))
-    if process.returncode != 0:
-        raise OSError(f"{command} does not take {name}: {_complaint(process)}")
+    if compiler := own_compiler():
+        try:
+            with _written(sources) as folder:
+                compiler.run(*FLAGS, "-fsyntax-only", main, folder=folder)
+        except OSError as error:
+            raise OSError(f"{compiler.command[0]} does not take {name}: {error}") from error
 
 
-def _complaint(process: subprocess.CompletedProcess[str]) -> str:
-    """The first thing that a compiler complains of."""
-    lines = process.stderr.strip().splitlines() or [f"exit status {process.returncode}"]
-    return next((line for line in lines if "error" in line), lines[0])
+def library_key(*made_of: str, machine: str | None = None) -> str:
+    """Return the key of a library in the cache: of its text, its options and its machine."""
+    return sha256("\0".join((*made_of, machine or this_machine())).encode()).hexdigest()[:24]
+
+
+def find_library(category: str, key: str, function: str) -> CDLL | None:
+    """Load a library from the cache; None: there is none that has the function."""
+    with suppress(OSError):
+        for place in read_cached(category, key):
+            found = CDLL(str(place))
+            if hasattr(found, function):
+                return found
+    return None
+
+
+def load_library(category: str, key: str, function: str, make: Callable[[], bytes]) -> CDLL:
+    """Load a library from the cache; if it is not there, `make` gives its bytes, which are kept.
+
+    Raises:
+        OSError: it cannot be written, or not be loaded.
+
+    """
+    if found := find_library(category, key, function):
+        return found
+    with hold_lock(category_folder(category), wait=True):
+        # Another process may have been first.
+        if found := find_library(category, key, function):
+            return found
+        [place] = write_cached(category, key, {f"{category}{library_ending()}": make()})
+    return CDLL(str(place))
 
 
 def universal(libraries: Sequence[bytes]) -> bytes:

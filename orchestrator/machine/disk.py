@@ -1,48 +1,60 @@
-"""What processes leave each other on the disk, also when they are killed or the power is cut.
+"""Files and folders that outlast crashes: atomic writes, checksums, locks and temporary folders.
 
-Files are on the disk before they count, and records carry a checksum over themselves. A process
-that works on a folder holds a lock on it, which ends with the process, however that ends. Its
-temporary folder holds a marker, too: one with a marker and without a lock is not needed any more.
+A process that works on a folder holds a lock on it, which ends with the process, however that
+ends. So a temporary folder without a lock belongs to a process that was killed, and goes.
 """
 
 from __future__ import annotations
 
+import atexit
+import errno
 import json
-import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
-from hashlib import sha256
+from hashlib import file_digest, sha256
+from itertools import count
 from pathlib import Path
 from shutil import rmtree
 from stat import S_ISDIR
 from tempfile import TemporaryDirectory, gettempdir
 from threading import RLock
-from typing import Any
-from uuid import uuid4
+from typing import TYPE_CHECKING, Any
 
-from orchestrator.machine.operating_system import is_mine, sync_to_disk, take_lock
+from orchestrator.machine.operating_system import is_mine, rename_to_new, sync_to_disk
 
-#: The entry of a record with its checksum.
+if TYPE_CHECKING:
+    from filelock import BaseFileLock
+
+#: The file in a folder that is locked: empty, and removed at the end.
+LOCK = ".auv-fmu.lock"
+
+#: Errors of file systems without locks.
+_NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
+
+#: Entry of a record with its checksum.
 _SEAL = "sha256"
 
-#: How the name of a process's temporary folder begins, and the file that proves it to be one.
+#: Prefix of temporary folders, and the file in each that holds its name.
 _PREFIX, _MARKER = "auvfmu-", ".auv-fmu.json"
 
-#: Held while that folder is made: threads must not make one each, but a signal may ask for it.
+#: Threads must not make a temporary folder each; reentrant, since a signal handler may need it.
 _MAKING = RLock()
 
 
+# Records with a checksum
+
+
 def sealed(content: Mapping[str, Any]) -> str:
-    """The text of a record, with its checksum."""
+    """Write a record as JSON, with its checksum."""
     return json.dumps({**content, _SEAL: _checksum(content)})
 
 
 def unsealed(text: str) -> dict[str, Any]:
-    """The content of a record that is as it was written.
+    """Read a record that :func:`sealed` has written.
 
     Raises:
-        ValueError: it is not, or is not such a record.
+        ValueError: it was changed since, or is no such record.
 
     """
     content = json.loads(text)
@@ -57,70 +69,115 @@ def _checksum(content: Mapping[str, Any]) -> str:
     return sha256(json.dumps(content).encode()).hexdigest()
 
 
-def write_new(path: Path, text: str) -> None:
-    """Write a text into a file that is not there yet; nor may a link be, which could lead anywhere.
+def sha256_of(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return file_digest(file, "sha256").hexdigest()
 
-    Raises:
-        OSError: it is there, or cannot be written.
 
-    """
-    with path.open("x", encoding="utf-8") as file:
-        file.write(text)
+# Files
 
 
 def write_whole(path: Path, text: str, partial: Path) -> None:
-    """Have a file hold a text: whatever happens meanwhile, it is the one before or this one.
+    """Write a text file atomically: after a crash it holds the old text or the new one.
 
     Args:
         path: of the file.
-        text: that it shall hold.
-        partial: beside it, a name that nobody else has: what a killed process left there is ours.
+        text: its new content.
+        partial: a name in the same folder that nobody else uses, for the unfinished file.
 
     Raises:
         OSError: it cannot be written.
 
     """
     partial.unlink(missing_ok=True)
-    write_new(partial, text)
+    # Never through a link, which could lead anywhere.
+    with partial.open("x", encoding="utf-8") as file:
+        file.write(text)
     sync_to_disk(partial)
     partial.replace(path)
     sync_to_disk(path.parent)
 
 
-def is_still(descriptor: int, status: os.stat_result) -> bool:
-    """Whether a descriptor is the file that it was, not closed since nor taken by another one."""
-    with suppress(OSError):
-        return os.path.samestat(os.fstat(descriptor), status)
-    return False
+def move_aside(path: Path) -> Path:
+    """Rename a file or folder of the user's to NAME.~N~, and return the new path.
+
+    Raises:
+        OSError: it cannot be renamed.
+
+    """
+    for n in count(1):
+        aside = path.with_name(f"{path.name}.~{n}~")
+        with suppress(FileExistsError):
+            rename_to_new(path, aside)
+            return aside
+    raise AssertionError
+
+
+# Locks and temporary folders
 
 
 @contextmanager
-def hold_lock(path: Path, wait: bool = False) -> Iterator[None]:
-    """Keep other processes from a file or folder.
+def hold_lock(folder: Path, wait: bool = False) -> Iterator[None]:
+    """Keep other processes out of a folder.
 
     Args:
-        path: of the file or folder.
-        wait: for another process that has it.
+        folder: which exists.
+        wait: for another process that is in it.
 
     Raises:
-        BlockingIOError: another process has it.
-        OSError: it cannot be opened.
+        BlockingIOError: another process is in it.
+        OSError: the folder cannot be written.
 
     """
-    release: Callable[[], object] = bool
-    # Where there are no locks, nobody is kept out.
-    with suppress(NotImplementedError):
-        release = take_lock(path, wait)
+    lock = _lock_of(folder)
+    try:
+        lock.acquire(blocking=wait)
+    except TimeoutError:
+        raise BlockingIOError(errno.EAGAIN, "another process is in it") from None
+    except OSError as error:
+        # Where there are no locks, nobody is kept out.
+        if error.errno not in _NO_LOCKS:
+            raise
     try:
         yield
     finally:
-        # An FMU may have closed it.
+        # While it is locked: later, it could be another process's.
+        is_open = not _remove_lock(folder / LOCK)
         with suppress(OSError):
-            release()
+            # An FMU may have closed its descriptor.
+            lock.release()
+        if is_open:
+            _remove_lock(folder / LOCK)
+
+
+def _remove_lock(path: Path) -> bool:
+    """Remove a lock file, unless the user has written into it; False: Windows says it is open."""
+    with suppress(FileNotFoundError):
+        try:
+            if path.is_file() and not path.is_symlink() and not path.stat().st_size:
+                path.unlink()
+        except PermissionError:
+            return False
+    return True
+
+
+def _lock_of(folder: Path) -> BaseFileLock:
+    # Slow to import.
+    from filelock import FileLock  # noqa: PLC0415
+
+    return FileLock(folder / LOCK, thread_local=False, preserve_lock_file=True)
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Provide a temporary folder for the context, which goes even if the process is killed."""
+    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
 
 
 def process_folder() -> Path:
-    """The folder for what is not needed after this process; it goes when the process ends."""
+    """Return the temporary folder of this process, which is removed when the process ends."""
     with _MAKING:
         return Path(_process_folder().name)
 
@@ -129,41 +186,38 @@ def process_folder() -> Path:
 def _process_folder() -> TemporaryDirectory[str]:
     _remove_left()
     folder = TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
-    # Without the marker it is not removed by others.
-    with suppress(OSError, NotImplementedError):
-        # Held until the process ends: nothing releases it.
-        take_lock(Path(folder.name))
-        marker = sealed({"folder": Path(folder.name).name, "token": uuid4().hex})
-        Path(folder.name, _MARKER).write_text(marker, encoding="utf-8")
+    path = Path(folder.name)
+    # Without a marker, no other process removes it.
+    with suppress(OSError):
+        lock = _lock_of(path)
+        lock.acquire(blocking=False)
+        # Held until the process ends; Windows removes no file that is open.
+        atexit.register(lock.release)
+        (path / _MARKER).write_text(path.name, encoding="utf-8")
     return folder
 
 
 def _remove_left() -> None:
     """Remove the temporary folders of processes that were killed."""
     for folder in Path(gettempdir()).glob(f"{_PREFIX}*"):
-        # Of another user, or gone meanwhile.
-        with suppress(OSError, NotImplementedError):
+        # It may be another user's, in use, or gone.
+        with suppress(OSError, ValueError):
             if not _is_ours(folder):
                 continue
-            release = take_lock(folder)
-            try:
+            with hold_lock(folder):
                 for path in folder.iterdir():
                     if path.is_dir() and not path.is_symlink():
                         rmtree(path)
-                    # The proof comes last: this process may be killed, too.
-                    elif path.name != _MARKER:
+                    # The marker goes last, as this process may be killed, too.
+                    elif path.name not in (_MARKER, LOCK):
                         path.unlink()
-                rmtree(folder)
-            finally:
-                release()
+                (folder / _MARKER).unlink()
+            folder.rmdir()
 
 
 def _is_ours(folder: Path) -> bool:
-    """Whether a folder says itself that a process of this user has made it."""
+    """Whether a process of this user has made a temporary folder: its marker holds its name."""
     marker, status = folder / _MARKER, folder.lstat()
-    try:
-        if not (S_ISDIR(status.st_mode) and is_mine(status)) or marker.is_symlink():
-            return False
-        return unsealed(marker.read_text(encoding="utf-8")).get("folder") == folder.name
-    except ValueError:
+    if not (S_ISDIR(status.st_mode) and is_mine(status)) or marker.is_symlink():
         return False
+    return marker.read_text(encoding="utf-8") == folder.name

@@ -25,7 +25,7 @@ class StartError(InputError):
 
 
 def reason(error: BaseException) -> str:
-    """What an exception says, in one line."""
+    """Return the message of an exception in one line."""
     if isinstance(error, MemoryError):
         return "out of memory"
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
@@ -35,10 +35,10 @@ def reason(error: BaseException) -> str:
 
 
 def unforeseen(error: Exception) -> str:
-    """What an exception says during a run, in one line.
+    """Return the message of an exception during a run in one line.
 
-    But for a full disk or short memory none is foreseen there. An FMU may have closed files of this
-    process, or changed what Python's modules hold.
+    Only a full disk and lack of memory are foreseen there. An FMU may have closed files of this
+    process, or changed modules of Python.
     """
     if isinstance(error, InputError | MemoryError):
         return reason(error)
@@ -51,7 +51,7 @@ def unforeseen(error: Exception) -> str:
 
 
 def shortened(text: str, most: int = 80) -> str:
-    """A text for a message, cut where it gets long."""
+    """Cut a long text for a message."""
     return text if len(text) <= most else f"{text[: most - 3]}..."
 
 
@@ -62,7 +62,7 @@ def listed(names: Sequence[str], between: str = ", ") -> str:
 
 
 def escape_unprintable(text: str, allowed: str = "") -> str:
-    """Escape what would speak to the terminal, in names as well.
+    """Escape control characters, which the terminal would obey.
 
     Args:
         text: to be shown.
@@ -76,13 +76,13 @@ def escape_unprintable(text: str, allowed: str = "") -> str:
 
 
 def last_line(text: str, otherwise: str = "no reason given") -> str:
-    """The last line of what a child process has said: the reason why it failed."""
+    """Return the last line that a child process has written, the reason why it failed."""
     lines = text.strip().splitlines()
     return lines[-1] if lines else otherwise
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """A hint at names that resemble a mistaken one, or begin with it; empty if there is none."""
+    """Return a hint at names that resemble a mistaken one or begin with it; empty if none does."""
     names = list(known)
     members = [other for other in names if other.startswith((f"{name}[", f"{name}."))]
     same = [other for other in names if other.casefold() == name.casefold()]
@@ -91,10 +91,10 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 class Refused(InputError):
-    """Something is refused for problems, of which the text has the first."""
+    """Something has problems; the message is the first of them."""
 
     def __init__(self, *problems: str) -> None:
-        """Say the first, and how many there are."""
+        """Make the message of the first problem and the number of others."""
         self.problems = problems
         more = len(problems) - 1
         others = f" (and {more} more: see `auv-fmu check`)" if more else ""
@@ -102,29 +102,29 @@ class Refused(InputError):
 
 
 class Findings:
-    """What is wrong with a file, in the order in which it was found.
+    """Problems of a file, in the order in which they were found.
 
     Attributes:
-        problems: what makes a run meaningless, or impossible.
-        notes: what is not as it should be, and changes no number.
+        problems: those that make a run meaningless or impossible.
+        notes: those that change no number.
 
     """
 
     def __init__(self, strict: bool = False) -> None:
-        """Begin with none; where it is strict, everything is a problem."""
+        """Begin with none; if `strict`, notes are problems, too."""
         self._strict = strict
         self.problems: list[str] = []
         self.notes: list[str] = []
         self._said: dict[str, set[str]] = {"problem": set(), "note": set()}
 
     def problem(self, text: str) -> None:
-        """Take note of what makes a run meaningless, or impossible."""
+        """Add a problem that makes a run meaningless or impossible."""
         if text not in self._said["problem"]:
             self._said["problem"].add(text)
             self.problems.append(text)
 
     def note(self, text: str) -> None:
-        """Take note of what changes no number."""
+        """Add a problem that changes no number."""
         if self._strict:
             self.problem(text)
         elif text not in self._said["note"]:
@@ -133,7 +133,7 @@ class Findings:
 
     @contextmanager
     def collecting(self) -> Iterator[None]:
-        """Take note of the mistakes that end what is done here, and let the rest go on."""
+        """Add the errors that end the context, and continue after it."""
         try:
             yield
         except InputError as error:
@@ -141,7 +141,7 @@ class Findings:
                 self.problem(text)
 
     def refuse(self) -> None:
-        """Refuse what has problems.
+        """Raise an error if there are problems.
 
         Raises:
             Refused: with all of them.

@@ -11,34 +11,33 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
 
-from orchestrator.machine.disk import is_still
-from orchestrator.machine.operating_system import never_wait_for_pipe
+from orchestrator.machine.operating_system import is_still, never_wait_for_pipe
 
 #: Ctrl-C, what a batch system sends, the end of the terminal, and Ctrl-Break of Windows.
 _STOPS = [
     getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, n)
 ]
 
-#: What ends a process that has not asked for it, such as the alarm that an FMU has set.
+#: Signals that end a process by default, such as an alarm that an FMU has set.
 _ENDS = [
     getattr(signal, n)
     for n in ("SIGALRM", "SIGVTALRM", "SIGPROF", "SIGUSR1", "SIGUSR2", "SIGIO", "SIGXCPU")
     if hasattr(signal, n)
 ]
 
-#: After so many signals, the user does not want to wait any more.
+#: After so many signals, the process ends at once.
 _INSISTENCE = 3
 
-#: [s] What an FMU has from the first signal on to return from its step: several signals may come
-#: at once, from a key held down or from a batch system, and the machine may be busy.
+#: Time that an FMU has from the first signal on to return from its step [s]: several signals may
+#: come at once, from a key held down or from a batch system, and the machine may be busy.
 _PATIENCE = 2.0
 
-#: Exit status of a process that a signal has ended, less the number of the signal.
+#: Exit status of a process that a signal has ended, minus the number of the signal.
 _SIGNALLED = 128
 
 
 class Interrupts:
-    """The signals to stop that have come.
+    """The signals to stop that were received.
 
     Python raises KeyboardInterrupt wherever it is, which may be inside an FMU: PythonFMU would
     then release its objects twice and crash the process. So signals are collected instead, and
@@ -46,17 +45,12 @@ class Interrupts:
 
     Attributes:
         numbers: of the signals, in their order.
-        hand_over: tells observers of the last rows, before the process is given up.
+        hand_over: passes the last rows to observers, before the process is given up.
 
     """
 
     def __init__(self, announce: Callable[[Interrupts], None] | None = None) -> None:
-        """Start with none.
-
-        Args:
-            announce: called at once when a signal comes.
-
-        """
+        """Start with none; `announce` is called at once when a signal comes."""
         self.numbers: list[int] = []
         self._announce = announce
         self.hand_over: Callable[[], None] = lambda: None
@@ -67,11 +61,11 @@ class Interrupts:
 
     @property
     def urgent(self) -> bool:
-        """Whether it is to end without what takes long: asked twice, or not from the keyboard."""
+        """Whether it is to end quickly: for a second signal, or one not from the keyboard."""
         return len(self.numbers) > 1 or any(number != signal.SIGINT for number in self.numbers)
 
     def __str__(self) -> str:
-        """The first signal, if it is not one that a user sends."""
+        """Name the first signal, if it is not one that a user sends."""
         first = self.numbers[0] if self.numbers else 0
         if first not in _ENDS:
             return ""
@@ -80,9 +74,9 @@ class Interrupts:
 
     @contextmanager
     def insistence(self, give_up: Callable[[], None]) -> Iterator[None]:
-        """Within the context, have the third signal end the process, whatever an FMU does.
+        """Within the context, the third signal ends the process, whatever an FMU does.
 
-        It ends two seconds after the first signal, at the earliest.
+        It ends no earlier than two seconds after the first signal.
 
         Args:
             give_up: ends the process, from another thread.
@@ -96,10 +90,10 @@ class Interrupts:
         never_wait_for_pipe(end_of_signals)
         before = signal.set_wakeup_fd(end_of_signals, warn_on_full_buffer=False)
         leaving = threading.Lock()
-        # A thread, because Python answers no signal while an FMU computes.
+        # A thread, because Python handles no signal while an FMU computes.
         arguments = (end_of_thread, give_up, leaving)
         with suppress(RuntimeError):
-            # Where none can be had, insistence is not heard.
+            # If none can be started, a third signal does nothing.
             threading.Thread(target=self._count, args=arguments, daemon=True).start()
         try:
             yield
@@ -137,13 +131,13 @@ class Interrupts:
 
 @contextmanager
 def orderly_end(of_process: bool) -> Iterator[None]:
-    """As long as the context lasts, leave by SIGTERM and SIGHUP as by any other exit.
+    """Within the context, exit normally on SIGTERM and SIGHUP.
 
-    What is temporary then goes, and child processes end.
+    Temporary files are removed then, and child processes end.
 
     Args:
-        of_process: whether the process ends after the context: signals to stop then change nothing
-            any more. Otherwise they are handled as before.
+        of_process: whether the process ends after the context. Signals to stop are ignored then;
+            otherwise they are handled as before.
 
     """
     if threading.current_thread() is not threading.main_thread():
@@ -161,7 +155,7 @@ def orderly_end(of_process: bool) -> Iterator[None]:
 
 
 def _leave(number: int, _frame: Any) -> None:
-    # Once: the way out is not to be cut short.
+    # A second signal must not interrupt the exit.
     signal.signal(number, signal.SIG_IGN)
     sys.exit(_SIGNALLED + number)
 
@@ -177,7 +171,7 @@ def held_interrupts(
 
     Args:
         announce: called at once when a signal comes.
-        is_last: whether they change nothing after it, until the context of :func:`orderly_end` is
+        is_last: whether they are ignored after it, until the context of :func:`orderly_end` is
             left; otherwise they are handled as before.
 
     """
@@ -189,7 +183,7 @@ def held_interrupts(
         yield outer
         return
     interrupts = Interrupts(announce)
-    # What is ignored stays so: nohup, or a shell's background.
+    # Ignored signals stay so: nohup, or a shell's background.
     heeded = [n for n in _STOPS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
     heeded += [n for n in _ENDS if signal.getsignal(n) is signal.SIG_DFL]
     before = {number: signal.signal(number, interrupts.take) for number in heeded}

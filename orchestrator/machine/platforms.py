@@ -6,7 +6,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-#: What FMI 3.0 and the zig compiler call a machine; with the oldest glibc that libraries run on.
+#: Names of machines in FMI 3.0 and for zig, with the oldest glibc that libraries run on.
 TARGETS = {
     "x86_64-linux": "x86_64-linux-gnu.2.17",
     "aarch64-linux": "aarch64-linux-gnu.2.17",
@@ -38,7 +38,7 @@ _PROCESSORS = {"amd64": "x86_64", "arm64": "aarch64"}
 
 
 class Platform(NamedTuple):
-    """Where a library runs.
+    """A platform that libraries are made for.
 
     Attributes:
         name: of its folder in `binaries`.
@@ -53,7 +53,7 @@ class Platform(NamedTuple):
 
 
 def platforms(fmi: str, names: str | None = None) -> list[Platform]:
-    """The platforms that are asked for, each once, in the order of the standard.
+    """Return platforms by their names, each once, in the order of the standard.
 
     Args:
         fmi: version, `2` or `3`.
@@ -86,6 +86,11 @@ def platforms(fmi: str, names: str | None = None) -> list[Platform]:
 
 
 def this_machine() -> str:
-    """What FMI 3.0 calls the machine that runs this; one it does not know is called alike."""
+    """Name of the machine that runs this, as in FMI 3.0, or formed like those if FMI has none."""
     processor = platform.machine().lower()
     return f"{_PROCESSORS.get(processor, processor)}-{platform.system().lower()}"
+
+
+def library_ending() -> str:
+    """Ending of libraries on the machine that runs this."""
+    return _ENDINGS.get(platform.system().lower(), ".so")

@@ -1,8 +1,8 @@
 """Files that the user names: only regular ones, so that none blocks and none is endless.
 
-Archives are unpacked once a process and content, into a temporary folder of the process, which ends
-with it. Running a system again then neither unzips an FMU nor loads its library a second time; and
-what was read of a file stays what it was, whatever becomes of the file.
+Archives are unpacked once for each process and content, into a temporary folder of the process.
+Running a system again then neither unzips an FMU nor loads its library a second time; and what was
+read of a file stays what it was, whatever becomes of the file.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import hashlib
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
 from io import BufferedReader
 from pathlib import Path, PurePosixPath
 from shutil import rmtree
@@ -23,62 +22,56 @@ from typing import NamedTuple, TextIO, TypeAlias
 from zipfile import ZipFile, ZipInfo
 
 from orchestrator.machine.disk import process_folder
-from orchestrator.machine.errors import InputError, did_you_mean, reason
+from orchestrator.machine.errors import InputError, reason
 
 #: Longest file that is read as a whole, and longest line of one that is not [characters].
 _LONGEST, _LONGEST_LINE = 10_000_000, 1_000_000
 
-#: An archive that holds more than this is not unpacked, nor one that does so with those in it.
+#: Most files and bytes that an archive may hold, with those nested in it.
 _MOST_FILES, _MOST_BYTES = 100_000, 2**30
 
-#: Nor one that is longer than this, whatever it says that it holds [bytes].
+#: Longest archive that is unpacked, whatever it says that it holds [bytes].
 _LONGEST_ARCHIVE = 2 * _MOST_BYTES
 
-#: Folders in folders that an archive may have: Python enters them one in the other.
+#: Most nested folders in an archive: Python enters them recursively.
 _MOST_FOLDERS = 100
 
-#: No more than this is unpacked in a process [bytes].
+#: Most that is unpacked in a process [bytes].
 _MOST_OF_A_PROCESS = 2**33
 
 #: Files of an archive that are read into memory, and how long they may be [bytes].
 _DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_000_000
 
-#: The beginning of a file that Git has left in place of another one.
+#: First bytes of a Git LFS pointer.
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
-#: Runs in several threads share what is unpacked.
+#: Threads share what is unpacked.
 _LOCK = Lock()
 
-#: A file as it is now; when it is written it gets another one.
+#: A file as it is now; when it is written, it gets another one.
 _Version: TypeAlias = tuple[int, ...]
 
 
-@dataclass
-class _Whole:
-    """An archive, and how much it and those in it have been unpacked to."""
+class _Size(NamedTuple):
+    """The size of an unpacked archive, and the outermost archive that it was nested in."""
 
-    archive: Path
-    files: int = 0
-    bytes: int = 0
+    files: int
+    bytes: int
+    outermost: Path
+    its_folder: Path
 
 
-#: By the folders that they are unpacked into.
-_wholes: dict[Path, _Whole] = {}
+#: By the folders of unpacked archives.
+_sizes: dict[Path, _Size] = {}
 
-#: Digests by the files that had them, and folders by the digests of what is in them.
+#: Digests by the files that had them, and folders by the digests of the archives in them.
 _digests: dict[_Version, str] = {}
 _folders: dict[str, Path] = {}
 
 
 @contextmanager
 def explain_errors(path: Path, what: str) -> Iterator[None]:
-    """Say of a mistake in a file which file it is.
-
-    Args:
-        path: of the file.
-        what: it is if there is a mistake in it, for example `not a table`.
-
-    """
+    """Name the file in errors of reading it; `what` it is then, for example `not a table`."""
     try:
         yield
     except InputError:
@@ -92,14 +85,14 @@ def explain_errors(path: Path, what: str) -> Iterator[None]:
 
 
 def is_folder(path: Path) -> bool:
-    """Whether there is such a folder; False also for an impossible name."""
+    """Tell whether there is such a folder; False also for an impossible name."""
     with suppress(OSError, ValueError):
         return path.is_dir()
     return False
 
 
 def check_file(path: Path) -> None:
-    """Check that a file is there that can be read to its end.
+    """Check that there is a file that can be read to its end.
 
     Raises:
         InputError: there is none, or it is a folder, a pipe or a device.
@@ -120,7 +113,7 @@ def read_text(path: Path, what: str) -> str:
 
     Args:
         path: of the file.
-        what: it is if it cannot be read as text.
+        what: it is if it cannot be read as text, for the message.
 
     Raises:
         InputError: there is no such file, it is too long, or no text in UTF-8.
@@ -136,11 +129,7 @@ def read_text(path: Path, what: str) -> str:
 
 @contextmanager
 def open_lines(path: Path, newline: str | None = None) -> Iterator[Iterator[str]]:
-    """Open a text in UTF-8, to take its lines one by one.
-
-    Args:
-        path: of the file.
-        newline: as `open` takes it.
+    """Open a text in UTF-8, to take its lines one by one; `newline` as for `open`.
 
     Raises:
         InputError: there is no such file.
@@ -159,37 +148,8 @@ def _bounded(file: TextIO) -> Iterator[str]:
         yield line
 
 
-def names_in(folder: Path) -> list[str]:
-    """The names of the files that come with the program in a folder, without their ending."""
-    return sorted(path.stem for path in folder.glob("*.toml"))
-
-
-def find_toml(name: str, folder: Path, what: str, files: str) -> Path:
-    """Find a file that comes with the program by its name, or any file of the user's by its path.
-
-    Args:
-        name: of the file, or its path, which ends in .toml.
-        folder: of those that come with the program.
-        what: it is, for the message.
-        files: that may be given in place of a name, for the message.
-
-    Raises:
-        InputError: there is none of that name.
-
-    """
-    if name.endswith(".toml"):
-        return Path(name)
-    known = names_in(folder)
-    if name not in known:
-        raise InputError(
-            f"no {what} {name!r}; there are {', '.join(known)}, or give {files}"
-            f"{did_you_mean(name, known)}"
-        )
-    return folder / f"{name}.toml"
-
-
 class Unpacked(NamedTuple):
-    """An archive as it was read: the folder that it was unpacked into, and its SHA-256."""
+    """The folder that an archive was unpacked into, and the SHA-256 of the archive."""
 
     folder: Path
     digest: str
@@ -218,24 +178,22 @@ def unpack(archive: Path) -> Unpacked:
 
 
 def unpacked_folder(archive: Path, digest: str) -> Path:
-    """Give the folder of an archive as it was read, in this process or in another one.
+    """Return the folder of an archive as it was read, in this process or in another one.
 
     Raises:
-        InputError: this process has not read it, and the file is another one now.
+        InputError: this process has not read it, and the file has changed.
 
     """
-    folder = _folders.get(digest)
-    if folder is None:
-        folder, now = unpack(archive)
-        _check_same(archive, now, digest)
-    return folder
+    if digest not in _folders:
+        _check_same(archive, unpack(archive).digest, digest)
+    return _folders[digest]
 
 
 def read_archive(archive: Path, digest: str) -> bytes:
-    """Read the bytes of an archive as it was read before.
+    """Read the bytes of an archive that was read before.
 
     Raises:
-        InputError: the file is another one now.
+        InputError: the file has changed.
 
     """
     check_file(archive)
@@ -251,8 +209,7 @@ def _check_same(archive: Path, now: str, digest: str) -> None:
 
 def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
     version = _version_of(file)
-    digest = _digests.get(version)
-    if digest is None:
+    if version not in _digests:
         with ZipFile(file) as content:
             # Before the file is read to its end, which it may not have.
             _check_entries(content)
@@ -261,27 +218,43 @@ def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
             file.seek(0)
             digest = hashlib.file_digest(file, "sha256").hexdigest()
             if digest not in _folders:
-                folder = _extracted(archive, content)
+                folder = _extracted(archive.resolve(), content)
                 if _version_of(file) != version:
                     rmtree(folder, ignore_errors=True)
                     raise InputError(f"{archive}: is being written; try again when it is complete")
                 _folders[digest] = folder
         _digests[version] = digest
-    return Unpacked(_folders[digest], digest)
+    return Unpacked(_folders[_digests[version]], _digests[version])
 
 
 def _version_of(file: BufferedReader) -> _Version:
     # A file that is written gets another time of change, whatever is done to the others.
-    it = os.fstat(file.fileno())
-    return it.st_dev, it.st_ino, it.st_size, it.st_mtime_ns, it.st_ctime_ns
+    status = os.fstat(file.fileno())
+    times = status.st_mtime_ns, status.st_ctime_ns
+    return status.st_dev, status.st_ino, status.st_size, *times
 
 
 def _extracted(archive: Path, content: ZipFile) -> Path:
-    archive, entries = archive.resolve(), content.infolist()
-    around = (_wholes.get(folder) for folder in archive.parents)
-    whole = next(filter(None, around), None) or _Whole(archive)
+    """Extract an archive into a new folder, unless it fills the disk with what there is."""
+    entries = content.infolist()
     files, size = len(entries), sum(entry.file_size for entry in entries)
-    _check_room(whole, files, size)
+    around = next((_sizes[folder] for folder in archive.parents if folder in _sizes), None)
+    outermost = archive if around is None else around.outermost
+    beside = [one for one in _sizes.values() if around and one.its_folder == around.its_folder]
+    for what, new, others, most in (
+        ("files", files, sum(one.files for one in beside), _MOST_FILES),
+        ("bytes", size, sum(one.bytes for one in beside), _MOST_BYTES),
+    ):
+        if new + others > most:
+            raise ValueError(
+                f"it unpacks to {new:,} {what}, and {outermost} with its nested archives to "
+                f"{new + others:,}, more than {most:,}"
+            )
+    if (total := size + sum(one.bytes for one in _sizes.values())) > _MOST_OF_A_PROCESS:
+        raise ValueError(
+            f"it unpacks to {size:,} bytes, and all archives of this process to {total:,}, more "
+            f"than {_MOST_OF_A_PROCESS:,}: run them in separate processes"
+        )
     try:
         folder = Path(mkdtemp(dir=process_folder().resolve()))
         try:
@@ -294,29 +267,8 @@ def _extracted(archive: Path, content: ZipFile) -> Path:
             f"{archive}: cannot be unpacked into {gettempdir()}: {reason(error)}; set "
             "TMPDIR to another folder"
         ) from error
-    _wholes[folder] = whole
-    whole.files += files
-    whole.bytes += size
+    _sizes[folder] = _Size(files, size, outermost, around.its_folder if around else folder)
     return folder
-
-
-def _check_room(whole: _Whole, files: int, size: int) -> None:
-    """Refuse what fills the disk together with what there is."""
-    within = f"and {whole.archive} with its nested archives to"
-    if (together := whole.files + files) > _MOST_FILES:
-        raise ValueError(
-            f"it unpacks to {files:,} files, {within} {together:,}, more than {_MOST_FILES:,}"
-        )
-    if (together := whole.bytes + size) > _MOST_BYTES:
-        raise ValueError(
-            f"it unpacks to {size:,} bytes, {within} {together:,}, more than {_MOST_BYTES:,}"
-        )
-    others = {id(one): one.bytes for one in _wholes.values()}
-    if (together := sum(others.values()) + size) > _MOST_OF_A_PROCESS:
-        raise ValueError(
-            f"it unpacks to {size:,} bytes, and all archives of this process to {together:,}, more "
-            f"than {_MOST_OF_A_PROCESS:,}: run them in separate processes"
-        )
 
 
 def _check_entries(content: ZipFile) -> None:
@@ -324,8 +276,7 @@ def _check_entries(content: ZipFile) -> None:
     entries = content.infolist()
     if len(entries) > _MOST_FILES:
         raise ValueError(f"it holds {len(entries):,} files, more than {_MOST_FILES:,}")
-    if sum(entry.file_size for entry in entries) > _MOST_BYTES:
-        size = sum(entry.file_size for entry in entries)
+    if (size := sum(entry.file_size for entry in entries)) > _MOST_BYTES:
         raise ValueError(f"it unpacks to more than {_MOST_BYTES:,} bytes: {size:,}")
     known: dict[PurePosixPath, ZipInfo] = {}
     for entry in entries:
@@ -342,9 +293,10 @@ def _check_entries(content: ZipFile) -> None:
             raise ValueError(f"{entry.filename!r} is longer than {_MOST_OF_A_DESCRIPTION:,} bytes")
 
 
-def _are_same(content: ZipFile, one: ZipInfo, other: ZipInfo) -> bool:
-    """Whether two entries of a path unpack to the same; some tools list one twice."""
-    if one is other:
+def _are_same(content: ZipFile, first: ZipInfo, second: ZipInfo) -> bool:
+    """Tell whether two entries unpack to the same: some tools list one twice."""
+    if first is second:
         return True
-    alike = all(getattr(one, of) == getattr(other, of) for of in ("filename", "file_size", "CRC"))
-    return alike and content.read(one) == content.read(other)
+    keys = ("filename", "file_size", "CRC")
+    alike = all(getattr(first, key) == getattr(second, key) for key in keys)
+    return alike and content.read(first) == content.read(second)

@@ -1,4 +1,4 @@
-"""Processes that work side by side on the cores, and end at once when the user says so."""
+"""Processes that work in parallel, and end at once when the user wants to stop."""
 
 from __future__ import annotations
 
@@ -29,44 +29,32 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.operating_system import most_processes, without_interrupt
 
-#: How long the loop waits before it asks whether it shall stop [s].
+#: Interval at which the loop asks whether it is to stop [s].
 _PATIENCE = 0.1
 
-#: How often a process is told to leave before it is ended.
+#: How often a process is asked to leave before it is killed.
 _REMINDERS = 8
 
 _Key = TypeVar("_Key", bound=Hashable)
 
 
 class Workers:
-    """Some processes, as :func:`workers` gives them, or threads.
-
-    Attributes:
-        n: how many.
-
-    """
+    """A pool of up to `n` processes, as :func:`workers` gives them, or threads."""
 
     def __init__(self, n: int, fresh: Callable[[], Executor], interrupts: Interrupts) -> None:
-        """Start none yet.
-
-        Args:
-            n: how many there may be.
-            fresh: gives a pool of them.
-            interrupts: signals to stop.
-
-        """
+        """Make a pool by `fresh`; it starts no process yet."""
         self.n = n
         self._fresh, self._interrupts = fresh, interrupts
         self._others = set(active_children())
         self._pool = fresh()
 
     def renew(self) -> None:
-        """End all processes, of which one has died: what follows is done by others."""
+        """Replace all processes, as one of them has died."""
         self.close(at_once=True)
         self._pool = self._fresh()
 
     def submit(self, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Have a process do something.
+        """Give a task to a process.
 
         Raises:
             InputError: none can be started.
@@ -76,7 +64,7 @@ class Workers:
             with without_interrupt():
                 return self._pool.submit(task, *arguments)
         except BrokenProcessPool as error:
-            # One has died that had nothing to do: that is said where the task is waited for.
+            # An idle one has died: this is reported where the task is waited for.
             future: Future[Any] = Future()
             future.set_exception(error)
             return future
@@ -84,7 +72,7 @@ class Workers:
             raise InputError(f"no process can be started: {reason(error)}") from error
 
     def done(self, futures: Iterable[Future[Any]]) -> set[Future[Any]]:
-        """Wait until one of some tasks is done.
+        """Wait until some of the tasks are done, and return these.
 
         Raises:
             KeyboardInterrupt: there was a signal to stop.
@@ -100,7 +88,7 @@ class Workers:
     def results(
         self, tasks: Mapping[_Key, Callable[[], Any]], unit: str
     ) -> Iterator[tuple[_Key, Any]]:
-        """Keys and results of tasks, which are begun in their order, as they are done.
+        """Yield keys and results of tasks as they are done; tasks begin in their order.
 
         Raises:
             InputError: a process has died, or none could be started.
@@ -111,7 +99,7 @@ class Workers:
         keys: dict[Future[Any], _Key] = {}
         with tqdm(total=len(tasks), unit=unit, disable=None) as bar:
             while True:
-                # No more than can be begun: what a process has been given it cannot give back.
+                # No more than can begin: a process returns no task unfinished.
                 for key, task in islice(left, self.n - len(keys)):
                     keys[self.submit(task)] = key
                 if not keys:
@@ -121,7 +109,7 @@ class Workers:
                     yield keys.pop(future), _result(future, unit)
 
     def close(self, at_once: bool = False) -> None:
-        """End all processes, when they are done with what they have been given or at once."""
+        """End all processes, at once or when they are done with their tasks."""
         if at_once:
             _end(set(active_children()) - self._others)
         self._pool.shutdown(cancel_futures=True)
@@ -138,16 +126,16 @@ def _result(future: Future[Any], unit: str) -> Any:
 
 @contextmanager
 def workers(n: int | None = None, setup: Callable[[], object] = bool) -> Iterator[Workers]:
-    """Processes for the time of the context; an exception ends them at once.
+    """Provide processes for the context; an exception ends them at once.
 
-    FMUs are libraries that a process loads, so the processes are fresh ones, not copies of this.
+    They are fresh ones, not copies of this, since FMUs are libraries that a process loads.
 
     Args:
         n: how many; None: one for each core.
         setup: called first in each of them.
 
     """
-    # What a killed process leaves goes with the folder of this one.
+    # Their temporary files are removed with those of this process, however they end.
     environment = {"TMPDIR": str(process_folder())} | cache.environment()
     begin, n = partial(_begin, environment, setup), min(n or cores(), most_processes())
     with held_interrupts() as interrupts:
@@ -162,9 +150,9 @@ def workers(n: int | None = None, setup: Callable[[], object] = bool) -> Iterato
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return the number of cores that this process may use."""
     n = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    # The share of a container; "max" where there is no limit.
+    # The quota of a container; "max" if there is none.
     with suppress(OSError, ValueError):
         quota, period = map(int, Path("/sys/fs/cgroup/cpu.max").read_text().split())
         n = min(n, -(-quota // period))
@@ -172,7 +160,7 @@ def cores() -> int:
 
 
 def _end(processes: Collection[BaseProcess]) -> None:
-    """Have processes leave: a run takes the first word to end, and an FMU may hear none."""
+    """Stop processes: first ask (a run takes the first signal to end), then kill."""
     for _ in range(_REMINDERS):
         for process in processes:
             process.terminate()
@@ -184,34 +172,34 @@ def _end(processes: Collection[BaseProcess]) -> None:
 
 
 def _begin(environment: Mapping[str, str], setup: Callable[[], object]) -> None:
-    """In a new process: leave by SIGTERM as by any other exit, without temporary folders."""
+    """Set up a new process, which leaves by SIGTERM without temporary folders."""
     os.environ.update(environment)
     tempfile.tempdir = environment["TMPDIR"]
     signal.signal(signal.SIGTERM, _leave)
     if hasattr(signal, "SIGHUP"):
-        # The end of the terminal is for the process to answer that has started this one.
+        # Only the process that has started this one answers the end of the terminal.
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     threading.Thread(target=_follow, daemon=True).start()
-    # As in the process that has started this one.
+    # As in the main process.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     imported_apart("matplotlib", "matplotlibrc")
     setup()
 
 
 def _follow() -> None:
-    """Leave with the process that has started this one, which may have been killed."""
+    """Leave when the process that has started this one ends, even if it is killed."""
     parent = parent_process()
     assert parent is not None
     parent.join()
     for _ in range(_REMINDERS):
-        # A run takes the first one to end.
+        # A run takes the first signal to end.
         os.kill(os.getpid(), signal.SIGTERM)
         time.sleep(_PATIENCE)
-    # What SIGTERM raises may be lost in a callback.
+    # An exception of SIGTERM may be lost in a callback.
     os._exit(1)
 
 
 def _leave(*_: Any) -> None:
-    # At once: what a task raises, the pool takes for its result, and goes on with the next.
+    # Not by an exception, which the pool would take for the result of a task.
     rmtree(process_folder(), ignore_errors=True)
     os._exit(1)

@@ -22,7 +22,6 @@ from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.machine.ledger import RECORD
 from orchestrator.machine.workers import Workers, workers
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS, show_effect
@@ -40,7 +39,7 @@ from orchestrator.paper.page import (
     without_pictures,
 )
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.folder import replace_files
+from orchestrator.runs.folder import RECORD, replace_files
 from orchestrator.runs.preparation import prepare_request
 from orchestrator.runs.request import Request
 from orchestrator.runs.result import RECORDED_PACKAGES, Stopwatch, write_content

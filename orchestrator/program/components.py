@@ -20,8 +20,8 @@ from fmus.ports.port import Misdeclared
 from fmus.script import is_component
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.structure import System
+from orchestrator.machine.disk import sha256_of
 from orchestrator.machine.errors import InputError, reason, shortened
-from orchestrator.machine.ledger import sha256_of
 from orchestrator.runs.bundle import current_fmus
 
 #: Where a native FMU has its equations.

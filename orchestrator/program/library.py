@@ -13,14 +13,18 @@ from fmpy import platform_tuple
 
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.machine.cache import read_cached
-from orchestrator.machine.compilers import EXPORTED, MATHEMATICS, SAME_NUMBERS
-from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.libraries import (
+from orchestrator.machine.compilers import (
+    ANY_PROCESSOR,
+    EXPORTED,
+    MATHEMATICS,
+    SAME_NUMBERS,
     compile_text,
-    find_best_compiler,
     library_key,
     load_library,
+    own_compiler,
+    zig,
 )
+from orchestrator.machine.errors import InputError, reason
 from orchestrator.program.writer import Text
 
 #: Category in the cache.
@@ -173,7 +177,7 @@ def _compiled(source: Source) -> bytes:
     """
     if source.library and source.machine == platform_tuple:
         return source.library
-    compiler = find_best_compiler()
+    compiler = zig(ANY_PROCESSOR) or own_compiler()
     if compiler is None:
         raise InputError(
             "a program needs a C compiler: install gcc or clang, or `pip install ziglang`"

@@ -11,21 +11,19 @@ import json
 import shutil
 import warnings
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TypedDict, Unpack
 
 from fmus.discovery import fingerprint
 from fmus.kinds import AUTO, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.cosim.formats.ssp.writer import ssp_bytes
-from orchestrator.machine.cache import category_folder, read_cached, users_folder, write_cached
-from orchestrator.machine.children import listen_to_module
+from orchestrator.machine.cache import made_once, read_cached, users_folder
+from orchestrator.machine.children import run_module
 from orchestrator.machine.compilers import compiler_for
-from orchestrator.machine.disk import hold_lock, process_folder
+from orchestrator.machine.disk import sha256_of, temporary_folder
 from orchestrator.machine.errors import InputError, last_line, reason
-from orchestrator.machine.ledger import sha256_of
 from orchestrator.machine.platforms import platforms
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
@@ -148,7 +146,7 @@ def run_fmus(
 
     """
     try:
-        process = listen_to_module(hear, f"fmus.{module}", "--out", str(folder), *options)
+        process = run_module(f"fmus.{module}", "--out", str(folder), *options, hear=hear)
     except OSError as error:
         raise InputError(f"the FMUs cannot be built: {reason(error)}") from error
     if process.returncode != 0:
@@ -175,18 +173,15 @@ def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
         return _best_fmus(fmi)
     if kind not in KINDS:
         raise InputError(f"kind {kind!r}: use one of {', '.join((AUTO, *KINDS))}")
-    key = key_of(kind, fmi)
-    if found := _kept(key):
-        return found
+    build = partial(_built, "--kind", kind, "--fmi", fmi)
     try:
-        with hold_lock(category_folder(CATEGORY), wait=True):
-            # Another process may have been first.
-            return _kept(key) or _built(key, "--kind", kind, "--fmi", fmi)
+        files = made_once(CATEGORY, key_of(kind, fmi), build)
     except OSError as error:
         raise InputError(
             f"cannot keep FMUs in {users_folder()}: {reason(error)}; set XDG_CACHE_HOME to a "
             "writable folder"
         ) from error
+    return next(iter(files.values())).parent
 
 
 def _best_fmus(fmi: str) -> Path:
@@ -218,9 +213,8 @@ def _kept(key: str) -> Path | None:
     return next((path.parent for path in read_cached(CATEGORY, key)), None)
 
 
-def _built(key: str, *options: str) -> Path:
-    """Build FMUs, and keep them."""
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as temporary:
-        run_fmus("build", Path(temporary), *options)
-        files = {path.name: path.read_bytes() for path in sorted(Path(temporary).iterdir())}
-    return write_cached(CATEGORY, key, files)[0].parent
+def _built(*options: str) -> dict[str, bytes]:
+    """Build FMUs, and return what their files hold, by name."""
+    with temporary_folder() as folder:
+        run_fmus("build", folder, *options)
+        return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}

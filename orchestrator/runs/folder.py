@@ -1,30 +1,375 @@
-"""A folder of results that changes all at once.
+"""Folders of results, whose files appear all at once and replace only what this program wrote.
 
-Files are written into a hidden folder within it; the folder's ledger then has them take the places
-of those of an earlier run. What an earlier run has written and this one does not is removed; files
-of others stay as they are. A run that came to no end does not take the place of one that did: it
-goes into a folder beside it.
+A folder that is written into has a ledger, `.auv-fmu.json`, with the names and digests of its own
+files. Only those are replaced or removed, as long as they are unchanged: all others are the user's.
+
+New files are written into a staging folder within it, named after the ledger's random token. To
+publish them, the ledger lists them, the earlier files move into the staging folder, the new ones
+take their places, and the ledger is written again. Until then the earlier files count: what fails
+or is killed before is undone, at once or by the next process that writes, and a process that only
+reads looks where they are. A failed run replaces no complete one: it goes into `incomplete`.
 """
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Iterable, Iterator
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from shutil import rmtree
+from stat import S_ISREG
+from typing import Any, NamedTuple
+from uuid import uuid4
 
-from orchestrator.machine.disk import hold_lock
+from orchestrator.machine import disk
+from orchestrator.machine.disk import move_aside, sha256_of
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.ledger import RECORD, Ledger, Taken, locate
+from orchestrator.machine.operating_system import is_mine, sync_to_disk
 
-#: Where a run that came to no end goes, if there is a whole result already.
-INCOMPLETE = "incomplete"
+#: The ledger, and what the names of the staging folder and of the ledger's next version begin with.
+LEDGER, _PREFIX = ".auv-fmu.json", ".auv-fmu-"
 
-#: The page that `auv-fmu view` makes of a result, which goes with it.
-VIEW = "view.html"
+#: The record of a result. Removed first and written last: where it is, the result is complete.
+RECORD = "run.json"
+
+#: The folder of a failed run beside a complete one, and the page that `auv-fmu view` makes.
+INCOMPLETE, VIEW = "incomplete", "view.html"
+
+#: The folder of the earlier files, in the staging folder.
+_EARLIER = ".earlier"
+
+#: A ledger is looked for in so many folders above a file, and read up to this length [bytes].
+_DEPTH, _LONGEST = 4, 64 * 2**20
+
+
+class Taken(InputError):
+    """A file of the user's has the name of one to be written."""
+
+
+class _Content(NamedTuple):
+    """The random token of a ledger, the digests of its files, and of those being published."""
+
+    token: str
+    files: dict[str, str]
+    moving: dict[str, str]
+
+
+class Ledger:
+    """The ledger of a folder, which must be locked.
+
+    Attributes:
+        folder: of the ledger.
+        token: random, one for each ledger.
+        staging: the folder that new files are written into.
+        moving: digests of files that are being published, by name.
+
+    """
+
+    def __init__(self, folder: Path, force: bool = False) -> None:
+        """Read the ledger or begin a new one, and undo what a killed process has half done.
+
+        Args:
+            folder: which exists.
+            force: move aside files of the user's that are in the way.
+
+        Raises:
+            Taken: there is such a file, or the ledger is damaged, and `force` is false.
+
+        """
+        self.folder, self._force, self._path = folder, force, folder / LEDGER
+        content = _content(self._path) if _is_believed(self._path, folder) else None
+        if content is None and os.path.lexists(self._path):
+            if not force:
+                raise Taken(
+                    f"{self._path} is damaged or not from auv-fmu, so its own files are unknown; "
+                    "choose another place (--out), or let --force move it aside"
+                )
+            move_aside(self._path)
+        self.token, self._files, self.moving = content or _Content(uuid4().hex, {}, {})
+        self.staging = folder / f"{_PREFIX}{self.token}"
+        self._partial = folder / f"{_PREFIX}{self.token}.json"
+        if self.moving:
+            self._undo()
+
+    @property
+    def files(self) -> Collection[str]:
+        """Names of the files, relative to the folder."""
+        return self._files.keys()
+
+    def owns(self, name: str) -> bool:
+        """Tell whether a file is unchanged since it was written here."""
+        digest = _digest_in(self.folder, name)
+        return digest is not None and digest in (self._files.get(name), self.moving.get(name))
+
+    def check(self, names: Iterable[str]) -> None:
+        """Check that files may be written.
+
+        Raises:
+            Taken: a file of the user's is in the way, and must not be moved aside.
+
+        """
+        for name in names:
+            while taken := self._taken(name):
+                if not self._force:
+                    what = "not a file that auv-fmu wrote, or was changed since"
+                    if taken.is_dir() and not taken.is_symlink():
+                        what = "a folder"
+                    raise Taken(
+                        f"{taken} is {what}: move it, choose another place (--out), or let --force "
+                        "move it aside"
+                    )
+                move_aside(taken)
+
+    def _taken(self, name: str) -> Path | None:
+        """Return what is in the way of a file: one of the user's, or a link on the way."""
+        for parent in [*Path(name).parents][-2::-1]:
+            path = self.folder / parent
+            if path.is_symlink() or (path.exists() and not path.is_dir()):
+                return path
+        path = self.folder / name
+        return path if os.path.lexists(path) and not self.owns(name) else None
+
+    @contextmanager
+    def writing(self) -> Iterator[Path]:
+        """Provide the staging folder; what is not published by the end is removed."""
+        is_new = not self._path.exists()
+        if is_new:
+            # So that the next process knows whose the staging folder is.
+            self._write()
+        self._discard()
+        try:
+            self.staging.mkdir()
+            yield self.staging
+        finally:
+            if not self.moving:
+                self._discard()
+                if is_new and not self._files:
+                    self._path.unlink(missing_ok=True)
+
+    @contextmanager
+    def changing(self) -> Iterator[Path]:
+        """Provide the staging folder, and publish its files at the end."""
+        with self.writing() as staging:
+            yield staging
+            self.publish()
+
+    def publish(self, replaced: Iterable[str] = ()) -> None:
+        """Move the files of the staging folder to their places; on failure nothing has changed.
+
+        Args:
+            replaced: names of earlier files that go, as far as they are unchanged.
+
+        Raises:
+            Taken: a file of the user's is in the way.
+            OSError: something cannot be written.
+
+        """
+        for path in (*self.staging.rglob("*"), self.staging):
+            sync_to_disk(path)
+        before = self._files
+        new = {name: sha256_of(self.staging / name) for name in _files_in(self.staging)}
+        going = [name for name in {*replaced} - new.keys() if self.owns(name)]
+        if not new and not going:
+            return
+        try:
+            # Those that are there with the same bytes are owned from here on.
+            self.moving = new
+            self.check(new)
+            self._write()
+            for name in sorted([*new, *going], key=lambda name: name != RECORD):
+                if os.path.lexists(self.folder / name):
+                    _move(self.folder / name, self.staging / _EARLIER / name)
+            for name in sorted(new, key=lambda name: (name == RECORD, name)):
+                _move(self.staging / name, self.folder / name)
+            for folder in {parent for name in new for parent in Path(name).parents}:
+                sync_to_disk(self.folder / folder)
+            files = (before | new).items()
+            self._files = {name: d for name, d in files if os.path.lexists(self.folder / name)}
+            self.moving = {}
+            # From here on the new files count.
+            self._write()
+        except BaseException:
+            self._files, self.moving = before, new
+            self._undo()
+            raise
+        self._discard()
+        self._remove_empty_folders(going)
+
+    def set_aside(self, place: Path, replaced: Iterable[str]) -> None:
+        """Publish the staging folder by renaming it, and remove what it replaces.
+
+        Raises:
+            OSError: it cannot be renamed.
+
+        """
+        self.staging.rename(place)
+        with suppress(OSError):
+            # Otherwise its files are the user's.
+            names = (f"{place.name}/{name}" for name in _files_in(place))
+            self._files |= {name: sha256_of(self.folder / name) for name in names}
+            self.remove(replaced)
+
+    def remove(self, names: Iterable[str]) -> None:
+        """Remove files that are unchanged, and the folders that are empty then."""
+        names = list(names)
+        for name in names:
+            if self.owns(name):
+                (self.folder / name).unlink()
+            self._files.pop(name, None)
+        self._remove_empty_folders(names)
+        if self._files:
+            self._write()
+        else:
+            self._path.unlink(missing_ok=True)
+
+    def _undo(self) -> None:
+        """Put everything back as it was before files were being published."""
+        if self.staging.is_dir() and not self.staging.is_symlink():
+            for name in self.moving:
+                is_out = _digest_in(self.folder, name) == self.moving[name]
+                if is_out and not (_has_link(self.staging, name) or (self.staging / name).exists()):
+                    _move(self.folder / name, self.staging / name)
+            for name in _files_in(self.staging / _EARLIER):
+                self.check([name])
+                _move(self.staging / _EARLIER / name, self.folder / name)
+            rmtree(self.staging / _EARLIER, ignore_errors=True)
+        self.moving = {}
+        with suppress(OSError):
+            # If it fails, the next process finds nothing left to undo.
+            self._write()
+
+    def _write(self) -> None:
+        record = {"identity": self.token, "files": self._files, "moving": self.moving}
+        disk.write_whole(self._path, disk.sealed(record), self._partial)
+
+    def _remove_empty_folders(self, names: Iterable[str]) -> None:
+        for parent in (parent for name in names for parent in [*Path(name).parents][:-1]):
+            with suppress(OSError):
+                # Fails if it is not empty.
+                (self.folder / parent).rmdir()
+
+    def _discard(self) -> None:
+        """Remove what nobody else has made, as its name shows."""
+        rmtree(self.staging, ignore_errors=True)
+        with suppress(OSError):
+            self._partial.unlink()
+
+
+def _move(source: Path, target: Path) -> None:
+    target.parent.mkdir(parents=True, exist_ok=True)
+    source.replace(target)
+
+
+def _has_link(folder: Path, name: str) -> bool:
+    """Tell whether a file in a folder, or a folder on the way to it, is a link."""
+    path = Path(name)
+    return any((folder / part).is_symlink() for part in (path, *[*path.parents][:-1]))
+
+
+def _digest_in(folder: Path, name: str) -> str | None:
+    """Digest of a file in a folder; None: there is none, or a link leads to it."""
+    is_there = not _has_link(folder, name) and (folder / name).is_file()
+    return sha256_of(folder / name) if is_there else None
+
+
+def _files_in(folder: Path) -> list[str]:
+    """Names of the files in a folder to which no link leads."""
+    names = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*"))]
+    is_plain = not folder.is_symlink()
+    return [n for n in names if is_plain and not _has_link(folder, n) and (folder / n).is_file()]
+
+
+def _content(path: Path) -> _Content | None:
+    """Read a ledger; None: there is none, or it is damaged, or somebody else's."""
+    try:
+        status = path.lstat()
+        if not S_ISREG(status.st_mode) or status.st_size > _LONGEST:
+            return None
+        record = disk.unsealed(path.read_text(encoding="utf-8"))
+        content = _Content(record["identity"], dict(record["files"]), dict(record["moving"]))
+        names = [Path(name) for name in (*content.files, *content.moving)]
+        # A forged one must not lead out of the folder.
+        leads_out = any(name.is_absolute() or ".." in name.parts for name in names)
+        return content if re.fullmatch("[0-9a-f]{32}", content.token) and not leads_out else None
+    except (OSError, ValueError, TypeError, LookupError, RecursionError):
+        return None
+
+
+def _is_believed(ledger: Path, folder: Path) -> bool:
+    """Tell whether a ledger belongs to the user, or to the owner of a folder below it.
+
+    Anybody could put one into a folder that all can write, such as /tmp.
+    """
+    if not os.path.lexists(ledger):
+        return False
+    # The folder itself may have moved into the staging folder.
+    nearest = next(path for path in (folder, *folder.parents) if path.exists())
+    return is_mine(ledger.lstat()) or ledger.lstat().st_uid == nearest.stat().st_uid
+
+
+def _ledgers_of(path: Path) -> Iterator[tuple[Path, str, _Content | None]]:
+    """Find the ledgers that may name a file: their folders, its name there, and their contents."""
+    for folder in path.parents[:_DEPTH]:
+        if _is_believed(folder / LEDGER, path.parent):
+            yield folder, path.relative_to(folder).as_posix(), _content(folder / LEDGER)
+
+
+def locate(path: Path) -> Path:
+    """Return where a file is while others are being published: new ones do not count yet."""
+    for folder, name, content in _ledgers_of(path):
+        if content is not None and content.moving:
+            staging = folder / f"{_PREFIX}{content.token}"
+            is_in_place = name in content.moving and not (staging / name).exists()
+            if (staging / _EARLIER / name).is_file() or (is_in_place and staging.is_dir()):
+                return staging / _EARLIER / name
+    return path
+
+
+def is_changed(path: Path) -> bool:
+    """Tell whether a file was changed since it was written, as far as a ledger says so."""
+    for _, name, content in _ledgers_of(path):
+        if content is None:
+            return True
+        if name in content.files:
+            return sha256_of(locate(path)) != content.files[name]
+    return False
+
+
+@contextmanager
+def locked_folder(folder: Path) -> Iterator[None]:
+    """Make a folder if there is none, and keep other runs out; new folders go if they stay empty.
+
+    Raises:
+        InputError: the folder cannot be made or written, or another run is writing into it.
+
+    """
+    absolute = folder.absolute()
+    # Path.exists raises without permission.
+    new = [path for path in (absolute, *absolute.parents) if not os.path.exists(path)]  # noqa: PTH110
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with disk.hold_lock(folder):
+            yield
+    except BlockingIOError:
+        raise InputError(
+            f"another run is writing into {folder}; wait for it, or choose another place (--out)"
+        ) from None
+    except OSError as error:
+        raise InputError(_cannot_write(folder, error)) from error
+    finally:
+        for path in new:
+            with suppress(OSError):
+                path.rmdir()
+
+
+@contextmanager
+def open_ledger(folder: Path, force: bool = False) -> Iterator[Ledger]:
+    """Lock a folder, and open its ledger: :func:`locked_folder` and :class:`Ledger`."""
+    with locked_folder(folder):
+        yield Ledger(folder, force)
 
 
 @contextmanager
@@ -35,132 +380,30 @@ def replace_files(
     force: bool = False,
     keep: Callable[[], bool] = lambda: False,
 ) -> Iterator[Path]:
-    """Give a folder to write files into; at the end they replace the earlier ones.
+    """Provide a folder to write files into; at the end they replace the earlier ones.
 
     An exception in the context leaves the folder as it was.
 
     Args:
         folder: of the files, made if it does not exist.
-        names: that will be written, as far as they are known: they are checked first.
+        names: of files that will be written, as far as they are known: they are checked first.
         force: move aside files of the user's that have names of these.
-        keep: asked, when they cannot take their places, whether to keep the written files.
+        keep: called if they cannot be published, to ask whether to keep them elsewhere.
 
     Raises:
-        InputError: the folder cannot be written, a name in it is taken by a file of the user's, or
-            another run is writing into it.
+        InputError: the folder cannot be written, a file of the user's is in the way, or another run
+            is writing into it.
 
     """
     with open_ledger(folder, force) as ledger:
         ledger.check(names)
-        with ledger.writing() as unfinished:
+        with ledger.writing() as staging:
             try:
-                yield unfinished
+                yield staging
                 publish(ledger)
             except (OSError, MemoryError, Taken) as error:
-                rest = _rest(unfinished, folder) if keep() and not ledger.is_moving else ""
+                rest = _rest(ledger) if keep() and not ledger.moving else ""
                 raise InputError(_cannot_write(folder, error, rest)) from error
-
-
-@contextmanager
-def open_ledger(folder: Path, force: bool = False) -> Iterator[Ledger]:
-    """Open the ledger of a folder, which is made if it does not exist, and keep other runs out.
-
-    Args:
-        folder: to write into.
-        force: move aside a file that has the ledger's name but is not one.
-
-    Raises:
-        InputError: the folder cannot be written, or another run is writing into it.
-
-    """
-    try:
-        with make_folder(folder), lock_folder(folder):
-            yield Ledger(folder, force)
-    except OSError as error:
-        raise InputError(_cannot_write(folder, error)) from error
-
-
-@contextmanager
-def make_folder(folder: Path) -> Iterator[None]:
-    """Make a folder and those above it; at the end the new ones go again that are empty.
-
-    Raises:
-        OSError: it cannot be made.
-
-    """
-    whole = folder.absolute()
-    # Path.exists raises without permission.
-    new = [path for path in (whole, *whole.parents) if not os.path.exists(path)]  # noqa: PTH110
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        yield
-    finally:
-        for path in new:
-            # Fails where there is something in it.
-            with suppress(OSError):
-                path.rmdir()
-
-
-def inner_folder(folder: Path, *names: str) -> Path:
-    """Give a folder in another one.
-
-    Raises:
-        InputError: a link leads to it, which could lead anywhere.
-
-    """
-    for name in names:
-        folder /= name
-        if folder.is_symlink():
-            raise InputError(
-                f"{folder}: is a link; remove it, or choose another folder (--out DIR)"
-            )
-    return folder
-
-
-def publish(ledger: Ledger) -> Path:
-    """Move the files written into a folder to their place, and return it."""
-    unfinished, folder = ledger.unfinished, ledger.folder
-    if (place := place_of(unfinished, folder)) != folder:
-        place.mkdir(exist_ok=True)
-        beside = Ledger(place)
-        with beside.writing() as empty:
-            empty.rmdir()
-            unfinished.rename(empty)
-            try:
-                _publish(beside)
-            except BaseException:
-                if not beside.is_moving:
-                    empty.rename(unfinished)
-                raise
-        return place
-    is_whole_result = (unfinished / RECORD).is_file() and failure_in(unfinished) is None
-    _publish(ledger)
-    incomplete = folder / INCOMPLETE
-    if is_whole_result and incomplete.is_dir() and not incomplete.is_symlink():
-        # What the user has changed of it stays.
-        with suppress(Taken, OSError):
-            earlier = Ledger(incomplete)
-            earlier.remove(earlier.files)
-            incomplete.rmdir()
-    return folder
-
-
-def _publish(ledger: Ledger) -> None:
-    # Anything but the result of a run, such as an export, replaces no run.
-    is_result = (ledger.unfinished / RECORD).is_file()
-    ledger.publish([*files_of(ledger.folder), VIEW] if is_result else ())
-
-
-@contextmanager
-def lock_folder(folder: Path) -> Iterator[None]:
-    """Keep other runs out; the lock ends with the process, however it ends."""
-    try:
-        with hold_lock(folder):
-            yield
-    except BlockingIOError:
-        raise InputError(
-            f"another run is writing into {folder}; wait for it, or choose another place (--out)"
-        ) from None
 
 
 def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
@@ -170,64 +413,72 @@ def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
     return f"cannot write into {folder}: {reason(error)}{rest}{hint}"
 
 
-def _rest(unfinished: Path, folder: Path) -> str:
-    """Give the written files a visible name; returns where they are, in words."""
-    if not unfinished.is_dir():
+def _rest(ledger: Ledger) -> str:
+    """Keep the files that cannot be published; returns where they are, in words."""
+    if not ledger.staging.is_dir():
         return ""
-    kept = next(place for place in _beside(folder) if not os.path.lexists(place))
     try:
-        # It may say that the run came to its end.
-        (unfinished / RECORD).unlink(missing_ok=True)
-        unfinished.rename(kept)
+        # It may say that the run was completed.
+        (ledger.staging / RECORD).unlink(missing_ok=True)
+        kept = ledger.staging.rename(_beside(ledger.folder))
     except OSError as error:
         return f"; nor can the files be kept: {reason(error)}"
     return f"; what was written is in {kept}"
 
 
-def _beside(folder: Path) -> Iterator[Path]:
-    """Where a result may go that does not replace another."""
-    return (folder / name for name in chain([INCOMPLETE], (f"{INCOMPLETE}-{n}" for n in count(2))))
+def publish(ledger: Ledger) -> Path:
+    """Move the files of the staging folder to their places, and return the folder."""
+    record, earlier = _record(ledger.staging), _record(ledger.folder)
+    place = place_of(ledger)
+    kept = [name for name in ledger.files if re.match(rf"{INCOMPLETE}(-\d+)?/", name)]
+    if place != ledger.folder:
+        ledger.set_aside(place, kept)
+    elif record:
+        names = earlier.get("files")
+        replaced = [*map(str, names if isinstance(names, list) else ()), VIEW]
+        ledger.publish(replaced if record.get("failure") else replaced + kept)
+    else:
+        # Anything but the result of a run, such as an export, replaces no result.
+        ledger.publish()
+    return place
 
 
-def place_of(unfinished: Path, folder: Path) -> Path:
-    """Where a result goes: beside a whole one, if it is not whole itself."""
-    if failure_in(unfinished) and (folder / RECORD).is_file() and not failure_in(folder):
-        return next(place for place in _beside(folder) if _has_room(place, unfinished))
-    return folder
+def place_of(ledger: Ledger) -> Path:
+    """Return where the result in the staging folder goes: a failed one beside a complete one."""
+    has_complete = (ledger.folder / RECORD).is_file() and not _failure(ledger.folder)
+    return _beside(ledger.folder) if has_complete and _failure(ledger.staging) else ledger.folder
 
 
-def _has_room(place: Path, unfinished: Path) -> bool:
-    """Whether a result can go into a folder without touching files of the user's."""
-    if not os.path.lexists(place):
-        return True
-    if place.is_symlink() or not place.is_dir():
-        return False
+def _beside(folder: Path) -> Path:
+    """Return the place for a result that must not replace another one."""
+    names = chain([INCOMPLETE], (f"{INCOMPLETE}-{n}" for n in count(2)))
+    return next(folder / name for name in names if not os.path.lexists(folder / name))
+
+
+def _record(folder: Path) -> dict[str, Any]:
+    """Read the record of a result; empty if there is none, or it is not one of this program."""
     try:
-        names = (path.relative_to(unfinished).as_posix() for path in unfinished.rglob("*"))
-        Ledger(place).check(name for name in names if (unfinished / name).is_file())
-    except Taken:
-        return False
-    return True
-
-
-def failure_in(folder: Path) -> str | None:
-    """Why the run came to no end whose result is in a folder; None: it did."""
-    failure = _record(folder / RECORD).get("failure")
-    return None if failure is None else str(failure)
-
-
-def files_of(folder: Path) -> set[str]:
-    """The files that the run says it has written whose record is in a folder."""
-    try:
-        return set(map(str, _record(folder / RECORD)["files"]))
-    except (KeyError, TypeError):
-        return set()
-
-
-def _record(path: Path) -> dict[str, Any]:
-    """A record; empty if there is none, or it is not ours."""
-    try:
-        record = json.loads(locate(path).read_text(encoding="utf-8"))
+        record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
         return {}
     return record if isinstance(record, dict) else {}
+
+
+def _failure(folder: Path) -> object:
+    return _record(folder).get("failure")
+
+
+def inner_folder(folder: Path, *names: str) -> Path:
+    """Return a folder within another one.
+
+    Raises:
+        InputError: it is reached by a link, which could lead anywhere.
+
+    """
+    for name in names:
+        folder /= name
+        if folder.is_symlink():
+            raise InputError(
+                f"{folder}: is a link; remove it, or choose another folder (--out DIR)"
+            )
+    return folder

@@ -15,12 +15,11 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib.machinery import PathFinder
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Unpack
 from zipfile import BadZipFile, ZipFile
 
 from fmus.discovery import ORIGIN, name_of, origin_of
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.bundle import BuildFailed, Form, run_fmus, words_of
 from orchestrator.runs.folder import replace_files
@@ -179,18 +178,18 @@ def build_own(
 
     """
     options = [str(script), *words_of(form)]
-    with TemporaryDirectory(dir=process_folder()) as temporary:
+    with temporary_folder() as temporary:
         own = script if script.is_dir() else script.parent
         place = own if folder is None else folder
         try:
-            run_fmus("build", Path(temporary), *options, *_home(own, place), hear=hear)
+            run_fmus("build", temporary, *options, *_home(own, place), hear=hear)
         except BuildFailed as error:
             removed = [path.name for path in _built_from(script, place)]
             for name in removed:
                 (place / name).unlink()
             gone = f"; {', '.join(removed)} of an earlier build is removed" * bool(removed)
             raise InputError(f"{error}{gone}") from None
-        [built] = Path(temporary).glob("*.fmu")
+        [built] = temporary.glob("*.fmu")
         with replace_files(place, [built.name], force=force) as unfinished:
             shutil.copyfile(built, unfinished / built.name)
     return place / built.name

@@ -36,9 +36,8 @@ from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.identity import PACKAGES, digest_of
-from orchestrator.machine.ledger import RECORD, is_changed, locate
 from orchestrator.machine.user_files import explain_errors, read_text
-from orchestrator.runs.folder import replace_files
+from orchestrator.runs.folder import RECORD, is_changed, locate, replace_files
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import read_columns, read_rows

@@ -35,12 +35,12 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.file_names import file_name
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
-from orchestrator.machine.ledger import LEDGER, Ledger
 from orchestrator.runs.folder import (
     INCOMPLETE,
+    LEDGER,
+    Ledger,
     inner_folder,
-    lock_folder,
-    make_folder,
+    locked_folder,
     place_of,
     publish,
     replace_files,
@@ -176,11 +176,11 @@ def _checkpoints_for(
     if folder is None or (every is None and not resume):
         raise InputError("checkpoints need checkpoint=, and checkpoint_every= or resume=")
     place = Path(folder)
-    try:
-        with make_folder(place), lock_folder(place):
-            yield checkpoints_of([prepared], [place], every, resume)
-    except OSError as error:
-        raise InputError(f"cannot write into {place}: {reason(error)}") from error
+    with locked_folder(place):
+        yield checkpoints_of([prepared], [place], every, resume)
+    with suppress(OSError):
+        # Fails if it is not empty. The lock was in it when the checkpoint was removed.
+        place.rmdir()
 
 
 # Runs into a folder
@@ -428,7 +428,7 @@ class _Output:
             )
         self._spare.unlink()
         self._write_ends(self._done)
-        return place_of(self._path, self._folder)
+        return place_of(Ledger(self._folder))
 
     def _give_up(self, run: WrittenRun) -> None:
         """Keep what is there and end the process; the thread that steps the FMUs never will."""

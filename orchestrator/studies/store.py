@@ -22,10 +22,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from orchestrator.figures.study_values import CAUTION, FAILURE, SCENARIO
+from orchestrator.machine.disk import move_aside
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.identity import differences
-from orchestrator.machine.ledger import Ledger, move_aside
-from orchestrator.runs.folder import open_ledger
+from orchestrator.runs.folder import Ledger, open_ledger
 from orchestrator.studies.engine import Outcome
 from orchestrator.studies.space import Space
 from orchestrator.studies.study_result import (

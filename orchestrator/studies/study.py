@@ -12,7 +12,8 @@ from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 from orchestrator.cosim.experiment import OrderName
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.file_names import file_name
-from orchestrator.machine.user_files import names_in, read_text
+from orchestrator.machine.user_files import read_text
+from orchestrator.runs import names_in
 
 #: What makes the runs; the first is the default.
 EngineName: TypeAlias = Literal["fmu", "batch"]

@@ -27,7 +27,8 @@ from orchestrator.figures.study_values import (
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, flatten, needed
 from orchestrator.machine.texts import is_finite
-from orchestrator.machine.user_files import explain_errors, find_toml, read_text
+from orchestrator.machine.user_files import explain_errors, read_text
+from orchestrator.runs import find_toml
 from orchestrator.runs.loading import is_path
 from orchestrator.studies.study import (
     ENGINES,

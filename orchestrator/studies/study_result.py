@@ -15,7 +15,7 @@ import numpy as np
 
 from orchestrator.figures.study_values import CAUTION, FAILURE
 from orchestrator.machine.errors import InputError, did_you_mean, reason
-from orchestrator.machine.ledger import is_changed, locate
+from orchestrator.runs.folder import is_changed, locate
 
 if TYPE_CHECKING:
     import pandas as pd

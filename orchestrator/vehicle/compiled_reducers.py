@@ -13,14 +13,16 @@ from fmus.native.names import RUNTIME
 from fmus.ports.reducer import Reducer
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.system.values import Value
-from orchestrator.machine.compilers import EXPORTED, FLAGS, MATHEMATICS
-from orchestrator.machine.identity import code_of
-from orchestrator.machine.libraries import (
+from orchestrator.machine.compilers import (
+    EXPORTED,
+    FLAGS,
+    MATHEMATICS,
     compile_text,
-    find_fast_compiler,
     library_key,
     load_library,
+    own_compiler,
 )
+from orchestrator.machine.identity import code_of
 
 #: Category in the cache.
 CATEGORY = "indices"
@@ -79,7 +81,7 @@ def _compiled(reducer: Reducer) -> bytes:
         OSError: it cannot be.
 
     """
-    compiler, text = find_fast_compiler(), _text(reducer)
+    compiler, text = own_compiler(), _text(reducer)
     if compiler is None or text is None:
         raise OSError(f"{reducer.name} cannot be compiled")
     return compile_text(compiler, text, *_OPTIONS)

@@ -12,6 +12,7 @@ import fmpy
 import pytest
 
 from fmus.python.packaging import LOADER, LOADER_FLAGS, build_script, loader_compiler
+from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs import bundle
 from support.hosts import bare_root, host, unpacked
 from support.settings import NAMES
@@ -37,7 +38,7 @@ def preloaded(folder: Path, text: str) -> str:
     source = folder / "preloaded.c"
     source.write_text(f"#define _GNU_SOURCE\n{text}")
     command = [
-        str(loader_compiler()),
+        str(machines_compiler()),
         "-shared",
         "-fPIC",
         "-o",
@@ -276,7 +277,9 @@ def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Pat
     fmpy.extract(dist / f"{name}.fmu", unzipdir=tmp_path / "fmu")
     library = tmp_path / "fmu/binaries/linux64" / f"{name}.so"
     subprocess.run(
-        [str(loader_compiler()), *sanitizers, "-o", library, *LOADER_FLAGS], cwd=LOADER, check=True
+        [str(machines_compiler()), *sanitizers, "-o", library, *LOADER_FLAGS],
+        cwd=LOADER,
+        check=True,
     )
     for seed in range(3):
         process = run(

@@ -345,7 +345,7 @@ def _stop(_: int, __: FrameType | None) -> None:
 
 def _forget() -> None:
     """Unpack archives anew."""
-    for kept in (user_files._folders, user_files._digests, user_files._wholes):
+    for kept in (user_files._folders, user_files._digests, user_files._sizes):
         kept.clear()
 
 

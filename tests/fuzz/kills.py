@@ -27,10 +27,9 @@ from tqdm import trange
 
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.machine.disk import process_folder
-from orchestrator.machine.ledger import LEDGER
 from orchestrator.paper import report
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.folder import open_ledger
+from orchestrator.runs.folder import LEDGER, open_ledger
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from support.machine import contents, ended, forked, is_over

@@ -36,11 +36,12 @@ from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.exchange import release
 from orchestrator.figures import drawing
 from orchestrator.figures.run_figures import figure_files
-from orchestrator.machine.ledger import LEDGER
+from orchestrator.machine.disk import LOCK
 from orchestrator.paper import report
 from orchestrator.paper.report import Section
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import MANIFEST, current_fmus
+from orchestrator.runs.folder import LEDGER
 from orchestrator.studies.engine import Engine, Outcome, Point
 from orchestrator.studies.store import Store
 from support.machine import contents, ended, forked
@@ -82,7 +83,7 @@ if STUDIES:
 
 #: Names of files that the program writes, or has written once, and some that only look like them.
 NAMES = [
-    LEDGER, f"{LEDGER}.~1~", ".auv-fmu-" + "0" * 32, ".auv-fmu-mine/a", ".unfinished-novel/a",
+    LEDGER, LOCK, f"{LEDGER}.~1~", ".auv-fmu-" + "0" * 32, ".auv-fmu-mine/a", ".unfinished-novel/a",
     ".partial-backup/a", ".partial-1.png", ".whole/run.json", ".whole/a", ".earlier.json", ".spare",
     "result.csv", "result.parquet", "result.csv.~1~", "certificates.csv", "metrics.json",
     "run.json", "view.html", "plot.png", "fig3a.png", "fig3a.svg", "both.png",
@@ -290,9 +291,9 @@ def test_every_file_of_the_users_stays(here: Path, name: str):
                     file.write("mine")
             fill(out, outside, what)
             before = {k: v for k, v in snapshot(out).items() if ours.get(k) != v}
-            if before.get(LEDGER) == b"":
-                # Has no byte to lose: as a process leaves it that is killed when it begins one.
-                del before[LEDGER]
+            if before.get(LOCK) == b"":
+                # Has no byte to lose: as a process leaves it that is killed.
+                del before[LOCK]
             elsewhere = snapshot(outside) | snapshot(here)
             arguments = [part.format(out=out, here=here) for part in COMMANDS[name]]
             if what.force and name != "new":

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from orchestrator.cosim.system.structure import System, renamed
+from orchestrator.cosim.system.structure import System
 
 
 def fleet_of(one: System, n: int, between: str = ".") -> System:
@@ -17,7 +17,7 @@ def fleet_of(one: System, n: int, between: str = ".") -> System:
 
     """
     all_of_them = [
-        renamed(one, {name: f"auv{i}{between}{name}" for name in one.components})
+        one.renamed({name: f"auv{i}{between}{name}" for name in one.components})
         for i in range(1, n + 1)
     ]
     return replace(

@@ -15,7 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.machine.ledger import LEDGER
+from orchestrator.machine.disk import LOCK
+from orchestrator.runs.folder import LEDGER
 
 #: Numbers from <linux/prctl.h> and <linux/capability.h>: what lets root write where it may not,
 #: and exceed limits.
@@ -179,9 +180,9 @@ def killed_at(n: int, work: Callable[[], object], calls: Sequence[str] = _CALLS)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files below a folder, hidden ones too, but for ledgers, each of which is another."""
+    """All files below a folder, hidden ones too, but for locks and ledgers, which all differ."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.name != LEDGER
+        if path.is_file() and path.name not in (LEDGER, LOCK)
     }

@@ -449,7 +449,7 @@ def test_another_process_finds_the_program_compiled(tmp_path):
         "from orchestrator.program import library\n"
         "from orchestrator.studies.engine import Point\n"
         "import pickle, sys\n"
-        "library.find_best_compiler = lambda: sys.exit('it compiles')\n"
+        "library.compile_text = lambda *_: sys.exit('it compiles')\n"
         "engine = pickle.load(sys.stdin.buffer)\n"
         "print(*engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
     )

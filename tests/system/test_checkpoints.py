@@ -14,6 +14,7 @@ import pytest
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim.hooks import checkpoint
 from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.cosim.hooks.hook import Run
 from orchestrator.cosim.observers.observer import Ending
@@ -225,6 +226,21 @@ def test_killed_at_any_time_by_the_kernel():
     process.kill()
     process.communicate()
     assert run(*arguments, "--resume", "--loop", "compiled", out="killed") == 0
+    assert result("killed") == result("whole")
+
+
+def test_killed_before_a_byte_of_the_rows_is_on_the_disk():
+    def doomed() -> None:
+        def opened(path: Path, *_: object) -> None:
+            path.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+
+        checkpoint.RowLog = opened
+        run(*LEFT, *CHECKPOINTS, out="killed")
+
+    assert ended(forked(doomed)) == -signal.SIGKILL
+    assert run(*LEFT, *CHECKPOINTS, "--resume", out="killed") == 0
+    assert run(*LEFT, out="whole") == 0
     assert result("killed") == result("whole")
 
 

@@ -13,9 +13,9 @@ from fmpy.util import read_csv
 
 from orchestrator.commands.main import main
 from orchestrator.machine.cache import users_folder
-from orchestrator.machine.ledger import LEDGER
 from orchestrator.runs import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs import bundle
+from orchestrator.runs.folder import LEDGER
 from orchestrator.runs.loading import load
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.studies.study import STUDIES_FOLDER as STUDIES

@@ -17,7 +17,7 @@ import pytest
 from orchestrator.cosim import loop
 from orchestrator.machine.cache import read_cached, write_cached
 from orchestrator.machine.disk import process_folder, sealed
-from orchestrator.machine.ledger import LEDGER, Ledger, Taken, is_changed, locate
+from orchestrator.runs.folder import LEDGER, Ledger, Taken, is_changed, locate
 from orchestrator.studies.sweep import making_runs
 from support.machine import called
 from support.texts import mentions
@@ -134,10 +134,10 @@ def test_a_folder_cannot_be_made_before_us(open_folder, other):
 def test_a_ledger_of_another_user_says_nothing_of_our_files(open_folder, other):
     """In a folder that all can write, above a file of ours that has a ledger or none."""
     forged = {"ours/a": sha256(b"forged").hexdigest()}
-    content = {"identity": "0" * 32, "files": {}, "moving": forged, "leaving": []}
+    content = {"identity": "0" * 32, "files": forged, "moving": forged}
 
     def plant() -> None:
-        waiting = open_folder / (".auv-fmu-" + "0" * 32) / "ours"
+        waiting = open_folder / (".auv-fmu-" + "0" * 32) / ".earlier" / "ours"
         waiting.mkdir(parents=True)
         (waiting / "a").write_text("forged")
         (open_folder / LEDGER).write_text(sealed(content))

@@ -11,7 +11,7 @@ from fmpy.ssp.simulation import simulate_ssp
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim.formats.ssp.writer import structure_xml, write_ssp
-from orchestrator.cosim.system.structure import renamed
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from support.archives import (
     archive,
@@ -112,7 +112,7 @@ def test_a_system_that_offers_connectors_is_one_component(tmp_path: Path):
     """In fmpy and here, what is fed from outside is integrated inside, and seen outside."""
     parts, fmu = ("in", "out"), relay(tmp_path)
     made = relays(dict.fromkeys(parts, fmu), {"out.u": "in.y"}, step=STEP, stop_time=STOP)
-    made = renamed(made, {name: f"inner.{name}" for name in parts})
+    made = made.renamed({name: f"inner.{name}" for name in parts})
     [path] = write_ssp(made, tmp_path, connectors=True)
     table = simulate_ssp(str(path), 0.0, STOP, STEP, input={"inner_in_u": lambda t: 5.0})
     assert np.array_equal(table["inner_in_y"], 5.0 * table["time"])

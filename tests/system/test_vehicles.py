@@ -11,7 +11,7 @@ import pytest
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System, renamed
+from orchestrator.cosim.system.structure import System
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
@@ -96,7 +96,7 @@ def test_each_vehicle_has_the_numbers_that_it_has_alone(results, alone, name):
 
 def inner(system: System) -> System:
     """The same with components named as in a nested system, of which several may have a plant."""
-    return renamed(system, {name: f"auv1.{name}" for name in system.components})
+    return system.renamed({name: f"auv1.{name}" for name in system.components})
 
 
 def test_names_of_components_may_have_dots():

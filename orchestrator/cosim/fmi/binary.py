@@ -24,9 +24,9 @@ from orchestrator.cosim.fmi.slaves import slave_class
 from orchestrator.cosim.fmi.surroundings import restore_mode, within_folder
 from orchestrator.cosim.system.component import Component
 from orchestrator.machine import cache
+from orchestrator.machine.compilers import compile_library, find_compiler
 from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.libraries import compile_library, find_compiler
 
 #: Headers of ELF files of 32 and of 64 bits: place and form of the part about tables, and length
 #: and form of the entries for segments.
@@ -336,8 +336,8 @@ def _check_compiler(component: Component) -> None:
 
 def _compiled(component: Component, sources: Sources) -> bytes:
     _check_compiler(component)
-    run = find_compiler()
-    assert run is not None
+    compiler = find_compiler()
+    assert compiler is not None
     warnings.warn(
         f"{component.fmu.name} has no binary for this machine, {_platform(component)}: its C "
         "sources are compiled now and kept for later runs",
@@ -346,7 +346,7 @@ def _compiled(component: Component, sources: Sources) -> bytes:
     cpp = ["-lstdc++"] * any(file.suffix != ".c" for file in sources.files)
     files = map(str, sources.files)
     return compile_library(
-        run, *_FLAGS, *sources.options, "-idirafter", str(_HEADERS), *files, "-lm", *cpp
+        compiler, *_FLAGS, *sources.options, "-idirafter", str(_HEADERS), *files, "-lm", *cpp
     )
 
 

@@ -28,10 +28,9 @@ import numpy as np
 from orchestrator.cosim.fmi.instance import Log
 from orchestrator.cosim.hooks.hook import NEVER, Lasting, Run
 from orchestrator.cosim.observers.observer import Ending, Header, NotKept
-from orchestrator.machine.disk import sealed, unsealed, write_whole
+from orchestrator.machine.disk import move_aside, sealed, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.identity import Identity, differences
-from orchestrator.machine.ledger import move_aside
 from orchestrator.machine.operating_system import sync_to_disk
 
 #: The file that grows, and the one that is replaced.
@@ -81,6 +80,7 @@ class RowLog:
         if not kept:
             self._file = path.open("x+b")
             self._file.write(_head(token))
+            self._file.flush()
             return
         row = width * _NUMBER.itemsize
         if is_whole := begins(path, token):
@@ -242,7 +242,10 @@ class Checkpoints:
         try:
             found = _read(self.folder)
             rows = self.folder / _ROWS
-            if os.path.lexists(rows) and not (found and begins(rows, found.identity)):
+            # A process that was killed when it began may have left an empty file of rows.
+            is_empty = rows.is_file() and not rows.is_symlink() and not rows.stat().st_size
+            is_ours = found and (is_empty or begins(rows, found.identity))
+            if os.path.lexists(rows) and not is_ours:
                 raise InputError(
                     f"{rows} is not a file of a checkpoint; move it, choose another folder, or let "
                     "--force move it aside"

@@ -14,8 +14,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.machine.disk import is_still
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.operating_system import is_still
 
 #: Rows that are read at once, and that are written to Parquet at once.
 ROWS_AT_ONCE = 8192

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -25,7 +24,7 @@ from orchestrator.exchange.hosts import drivers, here
 from orchestrator.exchange.hosts.environments import python_with
 from orchestrator.exchange.verify import ways
 from orchestrator.machine.children import run_module
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, last_line
 
 #: Largest deviation that is rounding: many tools add up their time.
@@ -214,8 +213,7 @@ def _ran(
     if host.pins:
         installing = f"{label} is being installed into its own environment"
         python = python_with(host.pins, lambda: told(installing))
-    with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         try:
             process = _process(host, python, system, experiment, folder)
         except subprocess.TimeoutExpired as error:

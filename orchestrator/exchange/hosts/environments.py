@@ -66,7 +66,8 @@ def python_with(requirements: Sequence[str], told: Callable[[], object] = bool) 
         folder = folder_of(requirements)
         python = Path(get_path("scripts", "venv", {"base": str(folder)}), "python")
         folder.mkdir(0o700, exist_ok=True)
-        with hold_lock(folder, wait=True):
+        # Not the folder itself, which is cleared.
+        with hold_lock(folder.parent, wait=True):
             if not is_whole(folder):
                 told()
                 _run([sys.executable, "-I", "-m", "venv", "--clear", str(folder)])

@@ -15,7 +15,7 @@ from support.settings import NAMES
 
 PLANT = source_of("AuvPlant").definition
 
-ANY = Compiler("any", ["any"], targets={})
+ANY = Compiler(["any"], label="any")
 
 
 @pytest.fixture(autouse=True)

@@ -13,7 +13,7 @@ import pytest
 
 from orchestrator.cosim import loop
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.machine import libraries
+from orchestrator.machine import compilers
 from orchestrator.machine.cache import write_cached
 from orchestrator.machine.compilers import FLAGS
 from orchestrator.machine.errors import InputError
@@ -36,7 +36,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 @pytest.fixture
 def no_compiler(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shutil, "which", lambda _: None)
-    monkeypatch.setattr(libraries, "find_spec", lambda _: None)
+    monkeypatch.setattr(compilers, "find_spec", lambda _: None)
 
 
 needs_compiler = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
@@ -96,7 +96,7 @@ def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, mon
     content = place.read_bytes()
     place.write_bytes(content[:length])
     loaded = []
-    monkeypatch.setattr(libraries, "CDLL", lambda path: loaded.append(path) or CDLL(path))
+    monkeypatch.setattr(compilers, "CDLL", lambda path: loaded.append(path) or CDLL(path))
     assert loop.load_stepper() is None
     assert loop.compile_stepper().advance
     assert loaded and str(place) not in loaded

@@ -67,7 +67,7 @@ def test_nobody_else_may_enter_whatever_the_umask(users, umask):
 
 
 @pytest.mark.parametrize("mode", [0o770, 0o702, 0o777, 0o1777])
-@pytest.mark.parametrize("folder", ["", "kind", "digests"])
+@pytest.mark.parametrize("folder", ["", "kind"])
 def test_a_folder_that_others_can_write_is_not_used(users, folder, mode):
     write_cached("kind", "0", CONTENT)
     (users / "auv-fmu" / folder).chmod(mode)
@@ -84,7 +84,7 @@ def test_a_parent_by_which_others_could_swap_it_is_not_used(users):
 
 
 @needs_root
-@pytest.mark.parametrize("folder", [".", "auv-fmu", "auv-fmu/kind", "auv-fmu/digests"])
+@pytest.mark.parametrize("folder", [".", "auv-fmu", "auv-fmu/kind"])
 def test_a_folder_of_another_user_is_not_used(users, folder):
     write_cached("kind", "0", CONTENT)
     os.chown(users / folder, STRANGER, STRANGER)
@@ -104,7 +104,7 @@ def test_a_file_of_another_user_is_not_used(users, pattern, harm):
     assert read_cached("kind", "0") == {}
 
 
-@pytest.mark.parametrize("folder", ["", "kind", "digests"])
+@pytest.mark.parametrize("folder", ["", "kind"])
 def test_links_are_not_followed_out_of_it(users, tmp_path, folder):
     write_cached("kind", "0", CONTENT)
     place = users / "auv-fmu" / folder
@@ -129,14 +129,14 @@ def test_what_is_not_as_it_was_is_not_found_and_stays(users, tmp_path_factory, d
     folder = tmp_path_factory.mktemp("cache")
     os.environ["XDG_CACHE_HOME"] = str(folder)
     paths = write_cached("kind", "0", CONTENT)
-    [record] = folder.rglob("*.json")
+    [record] = folder.rglob(".*.json")
     path = data.draw(st.sampled_from([*paths, record]))
     old = path.read_bytes()
     new = data.draw(
         st.one_of(
             st.binary(max_size=60),
             st.integers(0, max(0, len(old) - 1)).map(lambda n: old[:n]),
-            st.sampled_from([b"[]", b"{}", b"[" * 9999, b'{"folder": "..", "sha256": {}}', b"\0"]),
+            st.sampled_from([b"[]", b"{}", b"[" * 9999, b'{"..": ""}', b"\0"]),
         ).filter(lambda content: content != old)
     )
     path.write_bytes(new)
@@ -146,15 +146,23 @@ def test_what_is_not_as_it_was_is_not_found_and_stays(users, tmp_path_factory, d
     assert path.read_bytes() == new
 
 
-def test_a_record_leads_nowhere_else(users, tmp_path):
+def test_digests_lead_nowhere_else(users, tmp_path):
     write_cached("kind", "0", CONTENT)
-    [record] = users.rglob("*.json")
-    content = json.loads(record.read_text())
+    [digests] = users.rglob(".*.json")
+    content = json.loads(digests.read_text())
     (tmp_path / "a.so").write_bytes(CONTENT["a.so"])
-    for folder, file in (("../../..", "a.so"), (str(tmp_path), "a.so"), ("x", "../../../../a.so")):
-        digests = {file: content["sha256"]["a.so"]}
-        record.write_text(json.dumps({"folder": folder, "sha256": digests}))
+    for name in ("../../../../a.so", str(tmp_path / "a.so")):
+        assert (digests.parent / name).read_bytes() == CONTENT["a.so"]
+        digests.write_text(json.dumps({name: content["a.so"]}))
         assert read_cached("kind", "0") == {}
+
+
+def test_links_that_lead_to_each_other_are_said_when_something_is_written(users):
+    users.symlink_to("other")
+    users.with_name("other").symlink_to(users.name)
+    assert read_cached("kind", "0") == {}
+    with pytest.raises(OSError, match="symbolic links"):
+        write_cached("kind", "0", CONTENT)
 
 
 def test_a_fifo_does_not_hold_it_up(users):

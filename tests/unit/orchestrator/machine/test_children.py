@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.machine.children import listen_to_module
+from orchestrator.machine.children import run_module
 from support.tiers import slow
 
 #: Files that change what matplotlib does, or how it ends.
@@ -110,7 +110,7 @@ def test_lines_of_a_module_are_heard_before_it_ends(workplace, monkeypatch):
         lines.append(line)
         Path("heard").touch()
 
-    process = listen_to_module(hear, "speaker")
+    process = run_module("speaker", hear=hear)
     assert lines == process.stdout.splitlines() == ["first", "last"]
     assert process.returncode == 1
     assert process.stderr == "a complaint" + "." * 100_000 + "\n"
@@ -124,4 +124,4 @@ def test_an_exception_ends_the_module_that_is_heard(workplace, monkeypatch):
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        listen_to_module(interrupted, "speaker")
+        run_module("speaker", hear=interrupted)

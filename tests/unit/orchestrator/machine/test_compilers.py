@@ -100,7 +100,7 @@ def test_an_interrupt_stays_one_though_the_compiler_has_ended():
     """Python waits a quarter of a second for it, in which it ends."""
     threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
-        compilers.run_compiler([sys.executable, "-c", "import time; time.sleep(0.6)"])
+        compilers.Compiler([sys.executable]).run("-c", "import time; time.sleep(0.6)")
 
 
 def test_machine_without_a_compiler(machine: pytest.MonkeyPatch):

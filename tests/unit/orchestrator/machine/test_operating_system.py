@@ -30,75 +30,23 @@ def on(monkeypatch):
 
 
 class Kernel:
-    """Names of mutexes as Windows keeps them: a name is there while it has a handle."""
+    """What is asked of Windows' kernel."""
 
     def __init__(self) -> None:
-        self.names: dict[int, str] = {}
-        self.error, self.ignores = 0, []
-        self.refused: set[str] = set()
-        self.CreateMutexW = self._create
-
-    def _create(self, _security, _owned, name):
-        if name in self.refused:
-            self.error = 5
-            return None
-        self.error = 183 if name in self.names.values() else 0
-        handle = max(self.names, default=0) + 1
-        self.names[handle] = name
-        return handle
-
-    def CloseHandle(self, handle):
-        del self.names[handle.value]
+        self.ignores: list[bool] = []
 
     def SetConsoleCtrlHandler(self, handler, ignore):
         assert handler is None
         self.ignores.append(ignore)
 
 
-class Create:
-    """A function of ctypes takes the type of its result."""
-
-    def __init__(self, call) -> None:
-        self.call = call
-
-    def __call__(self, *arguments):
-        return self.call(*arguments)
-
-
 @pytest.fixture
 def kernel(on, monkeypatch) -> Kernel:
     faked = Kernel()
-    faked.CreateMutexW = Create(faked._create)
-    monkeypatch.setattr(ctypes, "WinDLL", lambda name, use_last_error: faked, raising=False)
-    monkeypatch.setattr(ctypes, "get_last_error", lambda: faked.error, raising=False)
-    monkeypatch.setattr(operating_system.time, "sleep", lambda _: faked.names.pop(1, None))
+    monkeypatch.setattr(ctypes, "WinDLL", lambda name: faked, raising=False)
+    monkeypatch.setattr(operating_system.time, "sleep", lambda _: None)
     on("win32")
     return faked
-
-
-def test_lock_on_windows_is_a_name_of_which_there_is_one(kernel: Kernel, tmp_path: Path):
-    release = operating_system.take_lock(tmp_path)
-    (tmp_path / "other").mkdir()
-    operating_system.take_lock(tmp_path / "other")()
-    for path in (tmp_path, tmp_path / "other" / ".."):
-        with pytest.raises(BlockingIOError):
-            operating_system.take_lock(path)
-    assert len(kernel.names) == 1
-    release()
-    assert not kernel.names
-    operating_system.take_lock(tmp_path)
-    # The other process leaves while this one sleeps.
-    operating_system.take_lock(tmp_path, wait=True)
-    assert len(kernel.names) == 1
-
-
-def test_lock_of_another_user_and_a_path_that_is_not_there(kernel: Kernel, tmp_path: Path):
-    operating_system.take_lock(tmp_path)
-    kernel.refused = set(kernel.names.values())
-    with pytest.raises(BlockingIOError):
-        operating_system.take_lock(tmp_path)
-    with pytest.raises(FileNotFoundError):
-        operating_system.take_lock(tmp_path / "missing")
 
 
 def test_processes_of_windows_inherit_that_they_ignore_ctrl_c(kernel: Kernel):

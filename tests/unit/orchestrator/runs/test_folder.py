@@ -1,4 +1,4 @@
-"""A folder of results changes all at once, or not at all."""
+"""A folder of results changes all at once or not at all, and only files of ours are replaced."""
 
 from __future__ import annotations
 
@@ -9,14 +9,26 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
+from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
 
 import pytest
 
+from orchestrator.machine.disk import sealed
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.ledger import LEDGER, RECORD, locate
-from orchestrator.runs.folder import make_folder, open_ledger, replace_files
+from orchestrator.runs.folder import (
+    LEDGER,
+    RECORD,
+    Ledger,
+    Taken,
+    is_changed,
+    locate,
+    locked_folder,
+    open_ledger,
+    replace_files,
+)
 from support.machine import contents, ended, forked, killed_at
 
 
@@ -45,7 +57,7 @@ def write_half(
 
 
 def settle(folder: Path) -> None:
-    """Go on with what a killed process has begun, as the next command does."""
+    """Undo what a killed process has half done, as the next command does."""
     with open_ledger(folder):
         pass
 
@@ -176,12 +188,14 @@ def test_everything_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch)
     monkeypatch.setattr(os, "replace", recorded_replace)
     write(tmp_path / "r", "a.csv", "below/b.csv")
     names = [(call, Path(path).name) for call, path in calls]
-    # The first new ledger is the one that says that the files take their places.
-    said = names.index(("replace", LEDGER))
-    assert {("fsync", name) for name in ("a.csv", "b.csv", "below", RECORD)} < set(names[:said])
-    assert names[said + 1] == ("fsync", "r")
-    moved = [name for call, name in names[said + 1 :] if call == "replace"]
-    assert moved == ["a.csv", "b.csv", RECORD, LEDGER]
+    # Ledgers: the first, the one with the files that are moved, and the one from which they count.
+    _, moving, counting = (i for i, name in enumerate(names) if name == ("replace", LEDGER))
+    assert {("fsync", name) for name in ("a.csv", "b.csv", "below", RECORD)} < set(names[:moving])
+    assert names[moving + 1] == ("fsync", "r")
+    moved = [name for call, name in names[moving + 1 : counting] if call == "replace"]
+    assert moved == ["a.csv", "b.csv", RECORD]
+    last = names.index(("replace", RECORD))
+    assert {("fsync", "r"), ("fsync", "below")} < {*names[last:counting]}
 
 
 @pytest.mark.slow
@@ -214,17 +228,19 @@ def test_killed_at_any_moment_the_folder_holds_the_old_result_or_the_new_one(tmp
 
 
 @pytest.mark.slow
-def test_killed_again_while_the_next_command_goes_on_with_it(tmp_path: Path):
-    new, folder = tmp_path / "new", tmp_path / "r"
-    write(new, "a.csv", "new.png")
+def test_killed_again_while_the_next_command_undoes_it(tmp_path: Path):
+    old, folder = tmp_path / "old", tmp_path / "r"
+    write(old, "a.csv", "old.png", text="old")
 
     def begin() -> None:
         rmtree(folder, ignore_errors=True)
         write(folder, "a.csv", "old.png", text="old")
-        # Just before the first file is moved.
-        assert killed_at(1, lambda: write(folder, "a.csv", "new.png"), ["replace"])
-        assert (folder / "a.csv").read_text() == "old"
-        assert locate(folder / "a.csv").read_text() == "new"
+        # When all new files are in their places, but do not count yet.
+        assert killed_at(7, lambda: write(folder, "a.csv", "new.png"), ["replace"])
+        assert (folder / "a.csv").read_text() == "new"
+        assert locate(folder / "a.csv").read_text() == "old"
+        assert not locate(folder / "new.png").exists()
+        assert not is_changed(folder / "a.csv")
 
     n = 0
     while True:
@@ -232,7 +248,8 @@ def test_killed_again_while_the_next_command_goes_on_with_it(tmp_path: Path):
         if not killed_at(n, lambda: settle(folder)):
             break
         settle(folder)
-        assert contents(folder) == contents(new), n
+        visible = {k: v for k, v in contents(folder).items() if not k.startswith(".")}
+        assert visible == contents(old), n
         n += 1
     assert n > 4
 
@@ -274,17 +291,15 @@ def test_a_link_called_incomplete_leads_nowhere(tmp_path: Path):
 
 def test_rows_are_kept_that_cannot_go_beside_a_whole_result(tmp_path: Path, monkeypatch):
     write(tmp_path / "r", "a.csv", text="whole")
-    replace = os.replace
 
-    def fail(source: Path, target: Path) -> None:
-        if Path(target).parent.name == "incomplete":
-            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        replace(source, target)
+    def fail(*_: object) -> None:
+        monkeypatch.undo()
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(os, "replace", fail)
-    with pytest.raises(InputError, match=r"what was written is in .*/incomplete-2;"):
+    monkeypatch.setattr(os, "rename", fail)
+    with pytest.raises(InputError, match=r"what was written is in .*/incomplete;"):
         write(tmp_path / "r", "a.csv", text="half", failure="interrupted", keep=lambda: True)
-    assert (tmp_path / "r" / "incomplete-2" / "a.csv").read_text() == "half"
+    assert (tmp_path / "r" / "incomplete" / "a.csv").read_text() == "half"
 
 
 def test_a_run_that_came_to_no_end_takes_the_place_of_another_such(tmp_path: Path):
@@ -312,12 +327,205 @@ def test_what_is_no_result_takes_the_place_of_none(tmp_path: Path):
 
 def test_new_folders_that_stay_empty_go_again(tmp_path):
     new, below = tmp_path / "new", tmp_path / "new" / "below"
-    with make_folder(below):
-        below.rmdir()
+    with locked_folder(below):
+        rmtree(below)
     assert not new.exists()
-    with pytest.raises(OSError, match="long"), make_folder(below / ("x" * 300)):
+    with pytest.raises(InputError, match="long"), locked_folder(below / ("x" * 300)):
         pass
     assert not new.exists()
-    with make_folder(below):
+    with locked_folder(below):
         (new / "kept").touch()
     assert [*new.iterdir()] == [new / "kept"]
+
+
+def put(folder: Path, text: str, *names: str, force: bool = False) -> Ledger:
+    ledger = Ledger(folder, force)
+    with ledger.changing() as unfinished:
+        for name in names:
+            (unfinished / name).parent.mkdir(parents=True, exist_ok=True)
+            (unfinished / name).write_text(text)
+    return ledger
+
+
+def test_what_was_written_is_replaced_and_what_was_changed_is_not(tmp_path: Path):
+    put(tmp_path, "first", "a", "below/b")
+    put(tmp_path, "second", "a", "below/b")
+    assert contents(tmp_path) == {"a": b"second", "below/b": b"second"}
+    (tmp_path / "below/b").write_text("mine")
+    assert is_changed(tmp_path / "below/b")
+    assert not is_changed(tmp_path / "a")
+    before = contents(tmp_path)
+    with pytest.raises(Taken, match=r"below/b is not a file that auv-fmu wrote, or was changed"):
+        put(tmp_path, "third", "a", "below/b")
+    assert contents(tmp_path) == before
+    put(tmp_path, "third", "a", "below/b", force=True)
+    assert contents(tmp_path) == {"a": b"third", "below/b": b"third", "below/b.~1~": b"mine"}
+
+
+def test_folder_that_is_in_the_way_is_called_one(tmp_path: Path):
+    (tmp_path / "a").mkdir()
+    with pytest.raises(Taken, match="/a is a folder: move it"):
+        put(tmp_path, "ours", "a")
+    put(tmp_path, "ours", "a", force=True)
+    assert (tmp_path / "a.~1~").is_dir()
+
+
+def test_what_was_changed_is_not_removed(tmp_path: Path):
+    ledger = put(tmp_path, "ours", "a", "b", "below/c")
+    (tmp_path / "a").write_text("mine")
+    ledger.remove(["a", "b", "below/c"])
+    assert contents(tmp_path) == {"a": b"mine"}
+    assert not (tmp_path / LEDGER).exists()
+
+
+@pytest.mark.parametrize("name", ["a", "below/a"])
+def test_links_lead_nowhere(tmp_path: Path, name):
+    """Neither of a file nor of a folder, though there is what was written."""
+    folder, elsewhere = tmp_path / "r", tmp_path / "elsewhere"
+    folder.mkdir()
+    put(folder, "ours", name)
+    (folder / Path(name).parts[0]).rename(elsewhere)
+    (folder / Path(name).parts[0]).symlink_to(elsewhere)
+    before = contents(tmp_path)
+    with pytest.raises(Taken):
+        put(folder, "new", name)
+    Ledger(folder).remove([name])
+    assert contents(tmp_path) == before
+
+
+@pytest.mark.parametrize(
+    "content",
+    ["mine", "{}", "[]", '{"identity": "0", "files": {}}', sealed({"identity": "x"})],
+)
+def test_a_list_that_is_none_of_ours_proves_nothing(tmp_path: Path, content):
+    (tmp_path / LEDGER).write_text(content)
+    with pytest.raises(Taken, match="its own files are unknown"):
+        Ledger(tmp_path)
+    Ledger(tmp_path, force=True)
+    assert (tmp_path / f"{LEDGER}.~1~").read_text() == content
+
+
+@pytest.mark.parametrize("name", ["../precious", "/etc/hostname", "below/../../precious"])
+@pytest.mark.parametrize("entry", ["files", "moving"])
+def test_a_forged_ledger_does_not_lead_out_of_the_folder(tmp_path: Path, name, entry):
+    content = {"identity": "0" * 32, "files": {}, "moving": {}, entry: {name: "0" * 64}}
+    (tmp_path / "r").mkdir()
+    (tmp_path / "r" / LEDGER).write_text(sealed(content))
+    with pytest.raises(Taken, match="damaged or not from auv-fmu"):
+        Ledger(tmp_path / "r")
+
+
+@pytest.mark.parametrize("link", ["", ".earlier", ".earlier/below", ".earlier/below/key"])
+def test_a_forged_ledger_moves_nothing_from_elsewhere(tmp_path: Path, link):
+    """Somebody's folder may come with a ledger, and with links to files of the user's."""
+    folder, elsewhere = tmp_path / "r", tmp_path / "elsewhere"
+    staging, path = folder / (".auv-fmu-" + "0" * 32), Path(".earlier/below/key")
+    (elsewhere / path.parent).mkdir(parents=True)
+    (elsewhere / path).write_text("mine")
+    (staging / link).parent.mkdir(parents=True)
+    (staging / link).symlink_to(elsewhere / link)
+    content = {"identity": "0" * 32, "files": {}, "moving": {"below/key": "0" * 64}}
+    (folder / LEDGER).write_text(sealed(content))
+    with suppress(OSError):
+        put(folder, "ours", "a")
+    assert (elsewhere / path).read_text() == "mine"
+    assert not os.path.lexists(folder / "below" / "key")
+
+
+@pytest.mark.parametrize("link", ["", "below"])
+def test_a_forged_ledger_moves_nothing_elsewhere(tmp_path: Path, link):
+    folder, elsewhere = tmp_path / "r", tmp_path / "elsewhere"
+    staging = folder / (".auv-fmu-" + "0" * 32)
+    (folder / "below").mkdir(parents=True)
+    (folder / "below" / "key").write_text("mine")
+    (elsewhere / link).mkdir(parents=True)
+    (staging / link).parent.mkdir(parents=True, exist_ok=True)
+    (staging / link).symlink_to(elsewhere / link)
+    moving = {"below/key": sha256(b"mine").hexdigest()}
+    (folder / LEDGER).write_text(sealed({"identity": "0" * 32, "files": {}, "moving": moving}))
+    with suppress(OSError):
+        put(folder, "ours", "a")
+    assert (folder / "below" / "key").read_text() == "mine"
+    assert not list(elsewhere.rglob("key"))
+
+
+def test_what_the_user_has_put_in_the_way_of_earlier_files_stays(tmp_path: Path):
+    put(tmp_path, "old", "a", "below/b")
+    # When the new files are in their places, but do not count yet.
+    assert killed_at(5, lambda: put(tmp_path, "new", "a", "below/b"), ["replace"])
+    (tmp_path / "a").write_text("mine")
+    rmtree(tmp_path / "below")
+    (tmp_path / "below").symlink_to("nowhere")
+    before = contents(tmp_path)
+    with pytest.raises(Taken, match="/a is not a file that auv-fmu wrote"):
+        settle(tmp_path)
+    assert contents(tmp_path) == before
+    with open_ledger(tmp_path, force=True):
+        pass
+    found = {k: v for k, v in contents(tmp_path).items() if not k.startswith(".")}
+    assert found == {"a": b"old", "a.~1~": b"mine", "below/b": b"old"}
+    assert (tmp_path / "below.~1~").is_symlink()
+
+
+def test_no_link_is_written_through(tmp_path: Path):
+    """The token of a ledger that somebody brings is known to that somebody."""
+    (tmp_path / "precious").write_text("mine")
+    (tmp_path / "r").mkdir()
+    content = {"identity": "0" * 32, "files": {}, "moving": {}}
+    (tmp_path / "r" / LEDGER).write_text(sealed(content))
+    (tmp_path / "r" / (".auv-fmu-" + "0" * 32 + ".json")).symlink_to("../precious")
+    put(tmp_path / "r", "ours", "a")
+    assert (tmp_path / "precious").read_text() == "mine"
+    assert (tmp_path / "r" / "a").read_text() == "ours"
+
+
+@pytest.mark.parametrize("when", range(10))
+@pytest.mark.parametrize("kept", [["a", RECORD], ["a", "b", "below/c", "new", RECORD]])
+def test_files_that_cannot_take_their_places_leave_all_as_it_was(tmp_path, monkeypatch, kept, when):
+    """Whichever rename fails; and the next one succeeds."""
+    put(tmp_path, "first", "a", "b", "below/c", RECORD)
+    before, replace, calls = contents(tmp_path), Path.replace, iter(range(99))
+
+    def failing(path: Path, target: Path) -> Path:
+        if target.name != LEDGER and next(calls) == when:
+            raise PermissionError(1, "Operation not permitted", str(path))
+        return replace(path, target)
+
+    def publish(text: str) -> None:
+        ledger = Ledger(tmp_path)
+        with ledger.writing() as unfinished:
+            for name in kept:
+                (unfinished / name).parent.mkdir(exist_ok=True)
+                (unfinished / name).write_text(text)
+            ledger.publish(["a", "b", "below/c", RECORD])
+
+    monkeypatch.setattr(Path, "replace", failing)
+    with suppress(PermissionError):
+        publish("second")
+        assert next(calls) <= when
+    monkeypatch.setattr(Path, "replace", replace)
+    assert contents(tmp_path) in (before, dict.fromkeys(kept, b"second"))
+    assert not list(tmp_path.glob(".auv-fmu-*"))
+    publish("third")
+    assert contents(tmp_path) == dict.fromkeys(kept, b"third")
+
+
+def test_a_huge_ledger_is_not_read(tmp_path: Path):
+    (tmp_path / "a").write_text("mine")
+    with (tmp_path / LEDGER).open("wb") as file:
+        file.truncate(2**40)
+    assert is_changed(tmp_path / "a")
+    with pytest.raises(Taken, match="damaged or not from auv-fmu"):
+        Ledger(tmp_path)
+
+
+@pytest.mark.slow
+def test_no_bit_of_a_ledger_is_changed_unseen(tmp_path: Path):
+    put(tmp_path, "ours", "a")
+    text = (tmp_path / LEDGER).read_bytes()
+    for bit in range(8 * len(text)):
+        changed = bytearray(text)
+        changed[bit // 8] ^= 1 << bit % 8
+        (tmp_path / LEDGER).write_bytes(changed)
+        with pytest.raises(Taken):
+            Ledger(tmp_path)

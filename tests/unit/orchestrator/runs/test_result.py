@@ -23,8 +23,8 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
 from orchestrator.cosim.system.names import PortName
 from orchestrator.figures.drawing import save
+from orchestrator.machine.compilers import find_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.libraries import find_compiler
 from orchestrator.runs.result import (
     Stopwatch,
     content_of,

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.cosim.system.structure import renamed
+from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.engine import Point
@@ -95,7 +95,7 @@ def test_parameters_of_a_study_are_those_of_a_scenario(star, own, is_first):
 def test_values_of_components_in_systems_vary():
     """Units are those of their variables."""
     scenario, system = load_scenario("fig5")
-    nested = renamed(system, {name: f"auv1.{name}" for name in system.components})
+    nested = system.renamed({name: f"auv1.{name}" for name in system.components})
     content = {
         "scenario": "fig5", "parameters": {"auv1.planner.eta0": [0, 1, -3, 0, 0.5]},
         "vary": {"auv1.plant.ell": [0.3, 0.4], "auv1.controller.saturation": ["tanh"]},
