@@ -1,4 +1,4 @@
-"""docs/reference/fmi-answers.md, row by row, for an FMU of each kind as a C program would call it."""
+"""docs/reference/fmi-answers.md, row by row, for an FMU of each kind as C would call it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ WITHOUT_STATES = [
     *((WITHOUT_AN_INSTANCE, what) for what in without_an_instance()),
 ]
 KEYS = {
-    **dict.fromkeys(FIXTURES, [*rows(), *WITHOUT_STATES]),
+    **{kind: [*rows(), *WITHOUT_STATES] for kind in FIXTURES},
     # There are no resources to be found.
     FMI3: [
         key
@@ -107,9 +107,10 @@ def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker[Place, st
 def mistakes(worker: Worker[Place, str], key: Key, states: Sequence[str]) -> dict[str, str]:
     """The cells of a row that are not as the table says."""
     said = {state: worker.ask((key, state), PATIENCE) for state in states}
-    lost = {state: f"the process is lost: {s.why}" for state, s in said.items() if type(s) is Lost}
     return {
-        state: text for state, text in {**said, **lost}.items() if isinstance(text, str) and text
+        state: f"the process is lost: {text.why}" if isinstance(text, Lost) else text
+        for state, text in said.items()
+        if text
     }
 
 

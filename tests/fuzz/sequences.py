@@ -58,7 +58,7 @@ SENSIBLE, EXTREME = 0.7, 0.03
 #: After so many calls the serialised states are compared, too.
 STATES_EVERY = 10
 
-#: Steps that are taken from the last state, and once more when it is restored, and their length [s].
+#: Steps from the last state, and once more when it is restored, and their length [s].
 STEPS, H = 3, 0.02
 
 #: By which share of a time a step may end after the stop time.
@@ -117,7 +117,7 @@ _MOVING = {
 }
 _READING = {f"fmi2Get{fmi_type}" for fmi_type in TYPES}
 
-#: One function PythonFMU spells in its own way, and what is wrong with bytes depends on their format.
+#: One function PythonFMU spells in its own way; faults of bytes depend on their format.
 _OWN_WORDS, _REFUSED_STATE = re.compile("fmi2?GetRealOutputDerivatives"), "state refused: "
 
 

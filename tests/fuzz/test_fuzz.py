@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -66,9 +67,8 @@ TAKEN_ONCE: dict[str, Callable[[dict[str, Any]], None]] = {
 def test_states_that_were_taken_once_do_no_harm(kinds: list[Folders], name: str):
     python, native = (Trials(Library(folders[name])) for folders in kinds)
     for what, change in TAKEN_ONCE.items():
-        said = next(
-            state for state in map(states.read, python.bases) if state["mode"] == "stepping"
-        )
+        said = states.read(python.bases[2])
+        assert said is not None and said["mode"] == "stepping"
         change(said)
         python.hold(states.Mutant(states.sealed(said), what))
     for mode in range(4):
@@ -100,8 +100,6 @@ def test_call_that_ends_the_process_is_told(kinds: list[Folders], monkeypatch: p
 
 
 def _crashing(*_: object) -> Callable[[sequences.Task], list[sequences.Finding]]:
-    import os
-
     def do(task: sequences.Task) -> list[sequences.Finding]:
         if 26 in task.seeds:
             if task.log:

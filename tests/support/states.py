@@ -1,8 +1,7 @@
 """Serialised states that were tampered with: by their bytes, and by what they say.
 
-What a state in JSON says is changed by a grammar: one of its values becomes something else, a key
-comes, goes or is renamed, a part is taken from another state. Words of a state of an FMU in C become
-others. The checksum is left as it is or made to fit again; with one that fits, what the state says
+States in JSON are changed by a grammar: a value becomes something else, a key comes, goes or is
+renamed, a part is taken from another state. Words of a state of an FMU in C become others. The checksum is left as it is or made to fit again; with one that fits, what the state says
 is all that speaks against it.
 """
 
