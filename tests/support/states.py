@@ -1,8 +1,9 @@
 """Serialised states that were tampered with: by their bytes, and by what they say.
 
 States in JSON are changed by a grammar: a value becomes something else, a key comes, goes or is
-renamed, a part is taken from another state. Words of a state of an FMU in C become others. The checksum is left as it is or made to fit again; with one that fits, what the state says
-is all that speaks against it.
+renamed, a part is taken from another state. Words of a state of an FMU in C become others. The
+checksum is left as it is or made to fit again; with one that fits, what the state says is all that
+speaks against it.
 """
 
 from __future__ import annotations

@@ -54,21 +54,6 @@ def test_truth_values_reach_the_equations(slave):
     assert slave.get_real(B) == pytest.approx([-1.0, -2.0])
 
 
-def test_fixed_parameter_stays_what_it_was_at_the_start(slave):
-    initialised(slave).set_boolean([6], [False])
-    said = "up is fixed and cannot change after initialisation"
-    assert messages_of(slave) == [said]
-    assert answers_of(slave) == [Fmi2Status.error]
-    assert slave.get_boolean([6]) == [True]
-
-
-def test_fixed_parameter_may_be_set_to_what_it_is(slave):
-    initialised(slave).set_boolean([6], [True])
-    slave.set_real([H_MAX, GAIN], [integrator.H_MAX, 3.0])
-    assert slave.log_queue == []
-    assert slave.get_real([5]) == [3.0], "the others of the call are taken"
-
-
 def test_outputs_at_the_start_follow_every_value_that_is_set_until_then(slave):
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()
@@ -82,15 +67,6 @@ def test_outputs_at_the_start_follow_every_value_that_is_set_until_then(slave):
     slave.exit_initialization_mode()
     slave.set_real([0], [7.0])
     assert slave.get_real(B) == [-6.0, 0.0]
-
-
-def test_all_inputs_in_one_call_are_refused_after_the_end_as_one_is(slave):
-    initialised(slave).terminate()
-    slave.set_real(A, [1.0, 2.0])
-    slave.set_real(A[:1], [1.0])
-    assert slave.get_real(A) == [0.0, 0.0]
-    assert messages_of(slave) == ["fmi2SetReal is not allowed when terminated"]
-    assert answers_of(slave) == [Fmi2Status.error] * 2
 
 
 def test_what_equations_raise_is_named_and_logged_once_whatever_the_time(slave, monkeypatch):
@@ -166,23 +142,6 @@ def test_largest_number_of_internal_steps_is_allowed(slave, monkeypatch):
     assert slave.do_step(0.0, 0.06)
     assert not slave.do_step(0.0, 0.0601)
     assert "needs more than 3 internal steps" in slave.log_queue[0].msg
-
-
-def test_one_bad_value_among_good_ones_leaves_all_as_they_were(slave):
-    initialised(slave)
-    before = slave._get_fmu_state()
-    for references, values, status in (
-        ([0, 1], [5.0, nan], Fmi2Status.discard),
-        ([0, 5, 2], [5.0, 2.0, 1.0], Fmi2Status.error),
-        ([0, 5, 99], [5.0, 2.0, 1.0], Fmi2Status.error),
-        ([99, 1], [5.0, nan], Fmi2Status.error),
-        ([1, 99], [nan, 5.0], Fmi2Status.error),
-    ):
-        slave.log_queue.clear()
-        slave.set_real(references, values)
-        assert answers_of(slave) == [status]
-        assert {**slave._get_fmu_state(), "fault": False} == before
-    assert slave.do_step(0.0, 0.1)
 
 
 def test_values_that_the_host_brings_are_its_own(slave):
@@ -274,16 +233,6 @@ def test_outputs_that_are_not_finite_refuse_the_step(monkeypatch, tmp_path, b):
     assert slave._get_fmu_state() == {**before, "fault": True}
 
 
-@pytest.mark.parametrize("start", [nan, inf, -inf])
-def test_experiment_without_a_start_leaves_the_one_before(slave, start):
-    slave.setup_experiment(2.0)
-    slave.setup_experiment(start)
-    assert messages_of(slave) == [f"start time {start}: must be finite"]
-    assert answers_of(slave) == [Fmi2Status.error]
-    slave.enter_initialization_mode()
-    assert slave.get_real(C) == [2.0]
-
-
 def test_instances_share_one_class_that_is_named_like_the_component():
     made = slave_of("Integrator", integrator)
     assert slave_of("Integrator", integrator) is made
@@ -302,44 +251,6 @@ def seen(monkeypatch, tmp_path, *changes):
     slave = slave_of("Lag", imported(monkeypatch, tmp_path, *SEEN, *changes))(instance_name="lag")
     slave._has_loader = True
     return initialised(slave)
-
-
-def test_outputs_follow_inputs_without_a_step(monkeypatch, tmp_path):
-    slave = seen(monkeypatch, tmp_path)
-    for u in (0.5, 3.0):
-        slave.set_real([0], [u])
-        assert slave.get_real([1]) == [1.0 + u]
-    assert slave.do_step(0.0, 0.1)
-    [x] = slave._get_fmu_state()["state"]
-    assert slave.get_real([1]) == [x + 3.0]
-
-
-def test_outputs_of_a_sampled_component_are_those_before_the_step(monkeypatch, tmp_path):
-    slave = seen(monkeypatch, tmp_path, ("class Parameters", "SAMPLED = True\n\nclass Parameters"))
-    slave.set_real([0], [3.0])
-    assert slave.do_step(0.0, 0.1)
-    assert slave.get_real([1]) == [4.0]
-    saved = slave._get_fmu_state()
-    slave.set_real([0], [3.0])
-    [x] = saved["state"]
-    assert slave.get_real([1]) == [x + 3.0]
-    slave._set_fmu_state(saved)
-    assert slave.get_real([1]) == [4.0]
-    assert slave.do_step(0.1, 0.1)
-    assert slave.get_real([1]) == [x + 3.0], "whether or not an input was set"
-
-
-def test_outputs_that_are_refused_are_the_last_ones(monkeypatch, tmp_path):
-    slave = seen(monkeypatch, tmp_path)
-    for u in (9.0, 10.0):
-        slave.set_real([0], [u])
-        assert slave.get_real([0, 1]) == [u, 1.0]
-    assert messages_of(slave) == ["outputs refused: too far"]
-    assert answers_of(slave) == [Fmi2Status.error] * 2
-    assert slave.get_boolean([4]) == [True]
-    assert slave.do_step(0.0, 0.1), "they are evaluated when they are read"
-    slave.set_real([0], [0.0])
-    assert slave.get_real([1]) == [slave._get_fmu_state()["state"].x]
 
 
 def test_state_is_asked_whether_a_run_can_have_led_to_it(slave):

@@ -17,16 +17,11 @@ from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.variable import Refusal
 from fmus.python.state import Snapshot, measuring, restored
 from support.instances import ClassInstance
-from support.settings import NAMES, WITH_INPUTS
+from support.settings import REPRESENTATIVES
 
 
-@pytest.fixture(params=NAMES)
+@pytest.fixture(params=REPRESENTATIVES)
 def driver(request: pytest.FixtureRequest) -> ClassInstance:
-    return ClassInstance(request.param)
-
-
-@pytest.fixture(params=WITH_INPUTS)
-def driven(request: pytest.FixtureRequest) -> ClassInstance:
     return ClassInstance(request.param)
 
 
@@ -141,35 +136,11 @@ def test_state_that_no_run_can_have_led_to_is_refused_whole(what: str):
     assert plant.outputs() == untouched.outputs(), "a good state is taken after a bad one"
 
 
-@pytest.mark.parametrize("key", Snapshot.__annotations__)
-def test_state_with_a_part_missing_is_refused(driver, key):
-    saved = dict(driver.slave._get_fmu_state())
-    del saved[key]
-    driver.slave._set_fmu_state(saved)
-    assert driver.answers() == [Fmi2Status.error]
-
-
-#: Bytes that are no state at all.
-NO_STATES = {
-    "nothing": b"",
-    "no text": b"\x00 not a state \xff",
-    "a list": b"[1, 2]",
-    "a number": b"1",
-    "two thousand lists": b"[" * 2000,
-    "a hundred thousand objects": b'{"a":' * 100_000,
-    "half a number": b'{"mode": 1e',
-    "a number without end": b'{"start_time": ' + b"9" * 10_000 + b"}",
-    "an empty object": b"{}",
-}
-
-
-@pytest.mark.parametrize("what", NO_STATES)
-def test_bytes_that_are_no_state_are_refused(driver, what):
-    before = driver.slave._get_fmu_state()
-    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(NO_STATES[what]))
-    assert driver.answers() == [Fmi2Status.error]
-    assert driver.slave._get_fmu_state() == before
-    assert driver.get("fault") is False
+def test_state_with_a_part_missing_is_refused(driver):
+    saved = driver.slave._get_fmu_state()
+    for key in saved:
+        driver.slave._set_fmu_state({k: value for k, value in saved.items() if k != key})
+    assert driver.answers() == [Fmi2Status.error] * len(Snapshot.__annotations__)
 
 
 @given(place=st.integers(0), byte=st.integers(0, 255))
@@ -248,19 +219,6 @@ def test_state_from_before_the_initialisation_brings_an_instance_back_there(driv
     assert driver.outputs() == other.outputs()
 
 
-@pytest.mark.parametrize("serialised", [False, True])
-def test_run_continued_from_a_state_is_the_same_run_bit_for_bit(driver, serialised):
-    driver.run(0, 50)
-    saved, time = driver.slave._get_fmu_state(), driver.time
-    if serialised:
-        saved = driver.component._fmu_state_from_bytes(driver.component._fmu_state_to_bytes(saved))
-    expected = driver.run(50, 100)
-    for other in (driver, ClassInstance(driver.component.__name__)):
-        other.slave._set_fmu_state(saved)
-        other.time = time
-        assert other.run(50, 100) == expected
-
-
 #: What is not in the paper, in a run of AuvPlant.
 ADDITIONS = {"roll": False, "current__x": 0.3, "actuator__T__u": 0.2, "actuator__T__q": 1e-3}
 
@@ -284,26 +242,6 @@ def test_state_that_rolls_is_none_of_a_vehicle_that_does_not():
     other.slave._set_fmu_state({**saved, "parameters": {**saved["parameters"], "roll": False}})
     assert other.answers() == [Fmi2Status.error]
     assert "its roll, which is held at zero, is not zero" in other.messages()[0]
-
-
-def test_state_holds_parameters_faults_and_inputs(driven):
-    driven.slave.set_real([0], [0.75])
-    driven.slave.set_real([1], [nan])
-    other = ClassInstance(driven.component.__name__)
-    other.slave._set_fmu_state(driven.slave._get_fmu_state())
-    assert other.get("fault") is True
-    assert other.slave.get_real([0]) == [0.75]
-    assert other.messages() == []
-    assert other.step()
-
-
-def test_state_of_another_component_or_version_is_refused(driver):
-    driver.step()
-    before = driver.slave._get_fmu_state()
-    driver.slave._set_fmu_state({**before, "identity": "something else"})
-    driver.slave._set_fmu_state({})
-    assert driver.answers() == [Fmi2Status.error] * 2
-    assert driver.slave._get_fmu_state() == before
 
 
 def test_state_whose_initialisation_was_refused_is_one_of_an_instance_that_can_go_on():
