@@ -17,7 +17,7 @@ from fuzz.sequences import KINDS, SEQUENCES, STATES, attack, unpacked
 from support import states
 from support.hosts import GCC, compiled, sanitized, sanitizers
 from support.raw import Library
-from support.settings import EACH, NAMES, REPRESENTATIVES
+from support.settings import NAMES, REPRESENTATIVES
 from support.worker import Lost, Worker
 
 #: Seeds of CI: those of the night come after them.
@@ -35,7 +35,7 @@ def kinds(dist: Path, native: Path) -> Iterator[list[Folders]]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", EACH)
+@pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_both_kinds_answer_as_the_table_says(kinds: list[Folders], name: str, kind: str):
     """And alike; of states that were tampered with, none is taken that cannot be gone on from."""
     assert attack(kinds, name, kind, SEEDS[kind]) == []

@@ -765,7 +765,7 @@ def test_python_and_c_agree_bit_for_bit(
     types = sizes_of(both.functions[function])
 
     @given(st.tuples(*(st.sampled_from([*t.made]) if t.made else KINDS[t.word] for t in types)))
-    @settings(max_examples=40, deadline=None)
+    @settings(max_examples=20, deadline=None)
     def agree(numbers: tuple[float, ...]) -> None:
         python, c = both.python(function, numbers), both.c(function, numbers)
         if c.error == TOO_LARGE:
