@@ -26,35 +26,8 @@ WRITTEN = {"component.py", "page.md"}
 #: The component that stays: the fuzzer needs the states of another one.
 OTHER = "fmus.disturbance_generator.component"
 
-#: Tests of any component, and what they read.
-TESTS = (
-    "tests/fmu/test_built_fmu.py",
-    "tests/unit/fmus/native/test_translator.py",
-)
-READ = (
-    "tests/support", "tests/fuzz", "docs/reference/fmi-answers.md", "pyproject.toml",
-    "CITATION.cff", *TESTS,
-)  # fmt: skip
-
-_CONFTEST = """\
-from pathlib import Path
-
-import pytest
-from hypothesis import settings
-
-settings.register_profile("patient", deadline=None, derandomize=True)
-settings.load_profile("patient")
-
-
-@pytest.fixture
-def dist():
-    return Path("dist/python").absolute()
-
-
-@pytest.fixture
-def native():
-    return Path("dist/native").absolute()
-"""
+#: Files that the fuzzer reads.
+READ = ("tests/support", "tests/fuzz", "docs/reference/fmi-answers.md")
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
@@ -87,7 +60,6 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (tree / name).parent.mkdir(parents=True, exist_ok=True)
         copied = shutil.copytree if (ROOT / name).is_dir() else shutil.copyfile
         copied(ROOT / name, tree / name)
-    (tree / "tests/conftest.py").write_text(_CONFTEST)
     shutil.copytree(Path(__file__).parent / FOLDER, tree / "fmus" / FOLDER, ignore=ignored)
     for kind in ("python", "native"):
         python(tree, "-m", "fmus.build", "--kind", kind, "--out", f"dist/{kind}")
@@ -146,14 +118,6 @@ def test_reference_is_written_for_it(tree: Path, tmp_path: Path):
     held, before = u["u"][:-1], x["x"][:-1]
     expected = held + (before - held) * np.exp(-STEP / 0.5)
     np.testing.assert_allclose(x["x"][1:], expected, rtol=1e-9)
-
-
-@pytest.mark.slow
-def test_tests_of_any_component_hold_for_it(tree: Path):
-    chosen = ("-q", "-p", "no:cacheprovider", "-k", f"{NAME} or {FOLDER}")
-    said = python(tree, "-m", "pytest", *chosen, *TESTS)
-    assert "passed" in said
-    assert "failed" not in said
 
 
 @pytest.mark.slow
