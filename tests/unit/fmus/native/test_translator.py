@@ -94,14 +94,10 @@ def test_it_is_c_without_warnings(name, standard, tmp_path):
         ("def begin(parameters: A) -> A:\n    return A(parameters.y)\n", "10: y is not a field"),
         ("def begin(parameters: A) -> A:\n    return A(1.0, 2.0)\n", "10: A takes x"),
         ("def begin(state: A) -> A:\n    x, y = state\n    return A(x)\n", "2 names for 1 values"),
-        (
-            "def begin(parameters: A, t: int) -> A:\n    return A(parameters[t])\n",
-            "10: a computed subscript of something other than a tuple of parts of one type",
-        ),
-        (
-            "def begin(state: tuple[float, float], t: float) -> A:\n    return A(state[t])\n",
-            "10: a subscript that is a float, not an int",
-        ),
+        ("def begin(parameters: A, t: int) -> A:\n    return A(parameters[t])\n",
+         "10: a computed subscript of something other than a tuple of parts of one type"),
+        ("def begin(state: tuple[float, float], t: float) -> A:\n    return A(state[t])\n",
+         "10: a subscript that is a float, not an int"),
         ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is not a type"),
     ],
 )  # fmt: skip
