@@ -59,23 +59,14 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         item.user_properties += [("needs", needed)] * found
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_collection_modifyitems(
-    config: pytest.Config, items: list[pytest.Item]
-) -> Iterator[None]:
-    """Mark what the last run has skipped, for `-m skipped`, and begin with the release.
-
-    While one worker makes it, which takes two minutes, the others run what needs none.
-    """
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what the last run has skipped, for `-m skipped`."""
     if cache := getattr(config, "cache", None):
         skipped = {*cache.get(_SKIPPED, [])}
         for item in items:
             if not skipped.isdisjoint((item.nodeid, item.location[0])):
                 item.add_marker("skipped")
-    yield
-    needing = [item for item in items if "release" in getattr(item, "fixturenames", ())]
-    others = [item for item in items if item not in needing]
-    items[:] = [*needing[:1], *others, *needing[1:]]
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
