@@ -21,6 +21,7 @@ from orchestrator.commands.main import main
 from orchestrator.exchange.release import write_release
 from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import bundle
+from ready_wheel import write_fmus
 
 # A slow machine is no error, and the same tree gives the same result every time.
 settings.register_profile("patient", deadline=None, derandomize=True, max_examples=40)
@@ -143,12 +144,30 @@ def dist3(shared: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def release(shared: Path) -> dict[str, Path]:
+def ready(shared: Path) -> Path:
+    """FMUs for all platforms, as a wheel carries them, which take minutes; to be read only."""
+    folder = shared / "ready"
+    folder.mkdir(exist_ok=True)
+    with hold_lock(folder, wait=True):
+        if not (folder / bundle.CATEGORY).exists():
+            write_fmus(folder)
+    return folder
+
+
+def _copy_ready(ready: Path, module: str, folder: Path, *options: str, **_: object) -> None:
+    """Take the place of what would build FMUs for all platforms once more."""
+    kind, fmi = (options[options.index(name) + 1] for name in ("--kind", "--fmi"))
+    _copy(ready / bundle.CATEGORY / bundle.key_of(kind, fmi), module, folder)
+
+
+@pytest.fixture(scope="session")
+def release(shared: Path, ready: Path) -> dict[str, Path]:
     """What the archives of a release unpack to, by versions of FMI; to be read only."""
     folder = shared / "release"
     folder.mkdir(exist_ok=True)
-    with hold_lock(folder, wait=True):
+    with hold_lock(folder, wait=True), pytest.MonkeyPatch.context() as patch:
         if not any(folder.iterdir()):
+            patch.setattr(bundle, "run_fmus", partial(_copy_ready, ready))
             for archive in write_release(folder / "archives", print):
                 shutil.unpack_archive(archive, folder)
     return {fmi: next(folder.glob(f"auv-fmu-*-fmi{fmi}")) for fmi in FMI_VERSIONS}

@@ -27,7 +27,7 @@ from orchestrator.commands.main import main
 from orchestrator.live import assembly, module
 from orchestrator.machine.platforms import platforms
 from orchestrator.runs import bundle
-from ready_wheel import write_wheel
+from ready_wheel import write_programs, write_wheel
 from support.live import needs_npm, needs_zig
 from support.machine import contents
 from support.settings import NAMES, REPRESENTATIVES, WITH_INPUTS
@@ -87,9 +87,11 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
 @needs_zig
 @pytest.mark.usefixtures("script")
 def test_wheel_with_all_ready_runs_fig4_without_a_compiler_and_builds_nothing(
-    release: dict[str, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ready: Path, tmp_path: Path
 ):
-    wheel = write_wheel(tmp_path)
+    whole = shutil.copytree(ready, tmp_path / "ready")
+    write_programs(whole)
+    wheel = write_wheel(tmp_path, whole)
     assert wheel.name.endswith("-py3-none-any.whl")
     packages, cache, empty = tmp_path / "packages", tmp_path / "cache", tmp_path / "empty"
     empty.mkdir()
@@ -116,19 +118,6 @@ def test_wheel_with_all_ready_runs_fig4_without_a_compiler_and_builds_nothing(
     assert (empty / "live.html").stat().st_size > 100_000
     for category in ("fmus", module.CATEGORY, assembly.CATEGORY):
         assert not (cache / "auv-fmu" / category).exists()
-
-    # Its FMUs were built elsewhere, and give the archives of the release to the last byte.
-    ready = packages / "orchestrator/ready" / bundle.CATEGORY
-
-    def built(module: str, folder: Path, *options: str, **_: object) -> None:
-        kind, fmi = (options[options.index(name) + 1] for name in ("--kind", "--fmi"))
-        shutil.copytree(ready / bundle.key_of(kind, fmi), folder, dirs_exist_ok=True)
-
-    monkeypatch.setattr(bundle, "run_fmus", built)
-    assert main(["release", "--out", str(tmp_path / "archives")]) == 0
-    again = contents(tmp_path / "archives")
-    assert again == contents(release["2"].parent / "archives")
-    assert len(again) == len(FMI_VERSIONS)
 
 
 def test_bundle_built_again_elsewhere_is_the_same_to_the_last_byte(dist: Path, tmp_path: Path):
