@@ -172,53 +172,6 @@ def test_text_of_a_state_is_no_trap_for_the_message(driver):
     assert len(message) < 600
 
 
-@pytest.mark.parametrize("plain", [False, True])
-def test_state_that_is_saved_after_a_refusal_is_a_state_like_any(driver, plain):
-    """Without a loader it leads out of the steps that are discarded."""
-    driver.slave._has_loader = not plain
-    driver.slave._set_fmu_state({})
-    assert driver.step() is not plain
-    saved = driver.slave._get_fmu_state()
-    driver.slave._set_fmu_state(saved)
-    assert driver.slave._get_fmu_state() == saved
-    assert driver.step()
-
-
-def test_fault_is_that_of_the_state_that_is_restored(driver):
-    sound = driver.slave._get_fmu_state()
-    assert not driver.slave.do_step(0.0, -1.0)
-    faulty = driver.slave._get_fmu_state()
-    for saved, fault in ((sound, False), (faulty, True)):
-        driver.slave._set_fmu_state(saved)
-        assert driver.get("fault") is fault
-
-
-def test_state_before_the_first_step_is_that_of_its_parameters_and_inputs(driver):
-    """Whatever else is said of it: it is computed again."""
-    slave = driver.component(instance_name="initialising")
-    slave.setup_experiment(0.0)
-    slave.enter_initialization_mode()
-    true = slave._get_fmu_state()
-    driver.excite(1)
-    driver.step(0.02)
-    driver.slave._set_fmu_state({**driver.slave._get_fmu_state(), "mode": "initialising",
-                                 "time": 0.0, "inputs": true["inputs"]})  # fmt: skip
-    assert driver.slave._get_fmu_state() == true
-
-
-def test_state_from_before_the_initialisation_brings_an_instance_back_there(driver):
-    fresh = driver.component(instance_name="fresh")
-    driver.slave._set_fmu_state(fresh._get_fmu_state())
-    assert not driver.slave.do_step(0.0, 0.02)
-    assert driver.answers() == [Fmi2Status.error]
-    driver.slave.enter_initialization_mode()
-    driver.slave.exit_initialization_mode()
-    assert driver.step()
-    other = ClassInstance(driver.component.__name__)
-    other.step()
-    assert driver.outputs() == other.outputs()
-
-
 #: What is not in the paper, in a run of AuvPlant.
 ADDITIONS = {"roll": False, "current__x": 0.3, "actuator__T__u": 0.2, "actuator__T__q": 1e-3}
 
@@ -261,16 +214,6 @@ def test_state_whose_initialisation_was_refused_is_one_of_an_instance_that_can_g
     calm = ClassInstance("AuvPlant")
     calm.step()
     assert other.outputs() == calm.outputs()
-
-
-def test_saved_state_does_not_change_with_the_run(driver):
-    driver.excite(1)
-    driver.step()
-    saved = driver.slave._get_fmu_state()
-    text = json.dumps(saved)
-    driver.excite(2)
-    driver.step()
-    assert json.dumps(saved) == text
 
 
 class Pair(NamedTuple):
