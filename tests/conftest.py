@@ -144,6 +144,16 @@ def dist3(shared: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
+def plain(shared: Path) -> Path:
+    """A folder with the FMUs in Python without the native loader, to be read only."""
+    folder = shared / "plain"
+    with hold_lock(shared, wait=True):
+        if not folder.exists():
+            bundle.build_bundle(folder, loader="plain")
+    return folder
+
+
+@pytest.fixture(scope="session")
 def ready(shared: Path) -> Path:
     """FMUs for all platforms, as a wheel carries them, which take minutes; to be read only."""
     folder = shared / "ready"

@@ -11,7 +11,6 @@ import fmpy
 import pytest
 
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.runs import bundle
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
 from support.cells import has_call
 from support.kinds import FIXTURES
@@ -96,11 +95,12 @@ def workers(
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker[Place, str]]:
+def plain_worker(
+    plain: Path, tmp_path_factory: pytest.TempPathFactory
+) -> Iterator[Worker[Place, str]]:
     """The same for an FMU without the native loader."""
-    folder = tmp_path_factory.mktemp("plain")
-    bundle.build_bundle(folder, loader="plain")
-    with Worker(trials, *unpacked(folder, folder, PLAIN, "AuvPlant")) as process:
+    folders = unpacked(plain, tmp_path_factory.mktemp("plain"), PLAIN, "AuvPlant")
+    with Worker(trials, *folders) as process:
         yield process
 
 
@@ -125,14 +125,14 @@ def test_row(workers: Callable[[str, str], Worker[Place, str]], kind: str, key: 
 
 
 @pytest.mark.parametrize("key", [key for key in rows() if of_the_slave(key)])
-def test_row_of_a_plain_fmu(plain: Worker[Place, str], key: Key):
-    assert mistakes(plain, key, of_the_slave(key)) == {}
+def test_row_of_a_plain_fmu(plain_worker: Worker[Place, str], key: Key):
+    assert mistakes(plain_worker, key, of_the_slave(key)) == {}
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("key", without_the_loader(), ids=": ".join)
-def test_what_is_said_of_a_plain_fmu(plain: Worker[Place, str], key: Key):
-    wrong = plain.ask((key, "stepping"), PATIENCE)
+def test_what_is_said_of_a_plain_fmu(plain_worker: Worker[Place, str], key: Key):
+    wrong = plain_worker.ask((key, "stepping"), PATIENCE)
     expected = without_the_loader()[key]
     if isinstance(wrong, Lost):
         assert wrong.why.startswith("SIG"), wrong
