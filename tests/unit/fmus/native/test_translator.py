@@ -27,10 +27,8 @@ from fmus.language.build import Program
 from fmus.language.types import type_of
 from fmus.native.emit import Emitter
 from fmus.native.pieces import initializer
-from fmus.native.tables import tables
 from fmus.native.translator import deepest, translated
 from fmus.ports.groups import class_of, count_values, form, hints_of, is_class, parts_of
-from fmus.ports.port import FAULT, H_MAX, Port
 from fmus.python.component import LONGEST_MESSAGE, Component
 from fmus.script import source_of_script
 from support.equations import (
@@ -45,7 +43,7 @@ from support.equations import (
     structure,
 )
 from support.language import HEAD, module_of
-from support.settings import NAMES, behaviour_of, parameters_of, ports_of
+from support.settings import NAMES, behaviour_of
 
 #: Where equations live, and where they overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
@@ -121,110 +119,6 @@ def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):
         check=False,
     )
     assert why in process.stderr.splitlines()[-1]
-
-
-def test_names_are_given_other_values_one_by_one(tmp_path: Path):
-    """Each by a call with several arguments, whose commas stay what they are."""
-    (tmp_path / "own").mkdir()
-    (tmp_path / "own/__init__.py").touch()
-    (tmp_path / "own/behaviour.py").write_text(
-        "from __future__ import annotations\n\nfrom math import atan2\n\n\n"
-        "def turned(x: float, y: float, z: float) -> float:\n"
-        "    x, y = atan2(z, 1.0), atan2(z, 2.0)\n    return x + y\n"
-    )
-    code = (
-        "from fmus.language.build import Program\n"
-        "from fmus.native.emit import Emitter\n"
-        "from own.behaviour import turned\n"
-        "print(Emitter(Program(turned).functions.values()).text())\n"
-    )
-    process = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert "    x = atan2(z, 1.0); y = atan2(z, 2.0);\n" in process.stdout
-
-
-ROW = re.compile(
-    r'\{"(?P<name>.+?)", (?P<kind>[A-Z]+), (?P<causality>[A-Z]+), (?P<variability>[A-Z]+), '
-    r"(?P<place>[^,]+), (?P<start>[^,]+), (?P<minimum>[^,]+), (?P<maximum>[^,]+), "
-    r"(?P<choices>\w+), (?P<n>\d+)\},"
-)
-
-
-def rows(name: str) -> list[dict[str, str]]:
-    return [found.groupdict() for found in ROW.finditer(tables(source_of(name).definition))]
-
-
-def ports(name: str) -> list[Port]:
-    return [*ports_of(name), FAULT]
-
-
-@every
-def test_ports_are_those_of_the_declaration(name: str):
-    for row, port in zip(rows(name), ports(name), strict=True):
-        assert (row["name"], row["kind"]) == (port.name, port.type.upper())
-        assert row["causality"] == port.causality.upper()
-        assert row["variability"] == port.variability.upper()
-        for bound, none in (("minimum", "-DBL_MAX"), ("maximum", "DBL_MAX")):
-            limit = getattr(port, bound)
-            assert row[bound] == none if limit is None else float(row[bound]) == limit
-        assert float(row["start"]) == float(port.start or 0.0)
-
-
-@every
-def test_inputs_and_outputs_lie_in_their_order(name: str):
-    declared, text = ports(name), tables(source_of(name).definition)
-    for causality in ("INPUT", "OUTPUT"):
-        places = [
-            int(row["place"])
-            for row in rows(name)
-            if (row["causality"], row["kind"]) == (causality, "REAL")
-        ]
-        assert places == [*range(len(places))]
-        [found] = re.findall(rf"{causality.lower()}_references\[\] = \{{(.*)\}};", text)
-        names = [declared[int(n)].name for n in re.findall(r"FIRST_REFERENCE \+ (\d+)", found)]
-        if places:
-            real = [p.name for p in declared if p.causality.upper() == causality and p is not FAULT]
-            assert names == real
-
-
-@every
-def test_parameters_lie_where_the_equations_look_for_them(name: str):
-    """Each port gets another value, which is then found at its place."""
-    declared = parameters_of(name)
-    values = {
-        port.name: next(iter(port.choices.values())) if port.choices else float(i)
-        for i, port in enumerate(declared.ports)
-    }
-    model = declared.of(values)
-    parameters = [row for row in rows(name) if row["causality"] == "PARAMETER"]
-    for row in parameters:
-        [member] = re.findall(r"^PARAMETER_AT\((.*)\)$", row["place"])
-        if row["name"] == H_MAX:
-            assert member == "h_max"
-        else:
-            assert at(model, member.removeprefix("model.")) == values[row["name"]]
-    assert len({row["place"] for row in parameters}) == len(parameters)
-
-
-def at(model: Any, member: str) -> Any:
-    """A member as C names it: a tuple of Python is one with an array `v`."""
-    for field, place in re.findall(r"(\w+)(?:\.v\[(\d+)\])?", member):
-        model = getattr(model, field)
-        model = model[int(place)] if place else model
-    return model
-
-
-def test_choices_are_the_texts_and_the_numbers_of_the_equations():
-    text = tables(source_of("ObserverController").definition)
-    described = [row for row in rows("ObserverController") if row["kind"] == "ENUMERATION"]
-    declared = [port for port in ports("ObserverController") if port.type == "Enumeration"]
-    for row, port in zip(described, declared, strict=True):
-        [choices] = re.findall(rf"choice {row['choices']}\[\] = \{{(.*)\}};", text)
-        numbers = re.findall(r'\{"(\w+)", (\d+)\}', choices)
-        found = {name: int(number) for name, number in numbers}
-        assert found == dict(port.choices)
-        assert int(row["n"]) == len(found)
 
 
 def number(random: Random) -> float:
