@@ -28,11 +28,12 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.values import typed
 from orchestrator.runs.result import Result
 from support.texts import mentions
+from support.tiers import slow
 
 #: Communication step of the scenarios [s], and how many steps are compared.
 H, STEPS = 0.02, 300
 
-SCENARIOS = ("fig4", "path", "formation-v", "remus", "sea")
+SCENARIOS = ("fig4", "sea", *slow("formation-v", "remus"))
 
 #: What is open in all of these, and what a host drives it with.
 WAVE = "time,plant.water.x\n" + "".join(f"{H * k!r},{0.3 * sin(k)!r}\n" for k in range(STEPS))
@@ -162,7 +163,7 @@ def test_in_our_master_it_is_a_component_with_the_same_bits(workplace: Path):
     check(alone(path), expected("fig4"), outputs(path))
 
 
-@pytest.mark.parametrize("order", [JACOBI, GAUSS_SEIDEL, "feedthrough"])
+@pytest.mark.parametrize("order", [JACOBI, *slow(GAUSS_SEIDEL)])
 def test_orders_and_longer_steps_are_those_of_the_scenario(workplace: Path, order: str):
     Path("slow.toml").write_text(
         f'title = "Slow"\nstop_time = {STEPS * H}\norder = "{order}"\n[steps]\ncontroller = 0.04\n'
