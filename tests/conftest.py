@@ -21,6 +21,7 @@ from orchestrator.commands.main import main
 from orchestrator.exchange.release import write_release
 from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import bundle
+from ready_wheel import write_fmus
 
 # A slow machine is no error, and the same tree gives the same result every time.
 settings.register_profile("patient", deadline=None, derandomize=True, max_examples=40)
@@ -59,23 +60,14 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
         item.user_properties += [("needs", needed)] * found
 
 
-@pytest.hookimpl(wrapper=True)
-def pytest_collection_modifyitems(
-    config: pytest.Config, items: list[pytest.Item]
-) -> Iterator[None]:
-    """Mark what the last run has skipped, for `-m skipped`, and begin with the release.
-
-    While one worker makes it, which takes two minutes, the others run what needs none.
-    """
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Mark what the last run has skipped, for `-m skipped`."""
     if cache := getattr(config, "cache", None):
         skipped = {*cache.get(_SKIPPED, [])}
         for item in items:
             if not skipped.isdisjoint((item.nodeid, item.location[0])):
                 item.add_marker("skipped")
-    yield
-    needing = [item for item in items if "release" in getattr(item, "fixturenames", ())]
-    others = [item for item in items if item not in needing]
-    items[:] = [*needing[:1], *others, *needing[1:]]
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
@@ -152,12 +144,40 @@ def dist3(shared: Path) -> Path:
 
 
 @pytest.fixture(scope="session")
-def release(shared: Path) -> dict[str, Path]:
+def plain(shared: Path) -> Path:
+    """A folder with the FMUs in Python without the native loader, to be read only."""
+    folder = shared / "plain"
+    with hold_lock(shared, wait=True):
+        if not folder.exists():
+            bundle.build_bundle(folder, loader="plain")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def ready(shared: Path) -> Path:
+    """FMUs for all platforms, as a wheel carries them, which take minutes; to be read only."""
+    folder = shared / "ready"
+    folder.mkdir(exist_ok=True)
+    with hold_lock(folder, wait=True):
+        if not (folder / bundle.CATEGORY).exists():
+            write_fmus(folder)
+    return folder
+
+
+def _copy_ready(ready: Path, module: str, folder: Path, *options: str, **_: object) -> None:
+    """Take the place of what would build FMUs for all platforms once more."""
+    kind, fmi = (options[options.index(name) + 1] for name in ("--kind", "--fmi"))
+    _copy(ready / bundle.CATEGORY / bundle.key_of(kind, fmi), module, folder)
+
+
+@pytest.fixture(scope="session")
+def release(shared: Path, ready: Path) -> dict[str, Path]:
     """What the archives of a release unpack to, by versions of FMI; to be read only."""
     folder = shared / "release"
     folder.mkdir(exist_ok=True)
-    with hold_lock(shared, wait=True):
+    with hold_lock(folder, wait=True), pytest.MonkeyPatch.context() as patch:
         if not any(folder.iterdir()):
+            patch.setattr(bundle, "run_fmus", partial(_copy_ready, ready))
             for archive in write_release(folder / "archives", print):
                 shutil.unpack_archive(archive, folder)
     return {fmi: next(folder.glob(f"auv-fmu-*-fmi{fmi}")) for fmi in FMI_VERSIONS}

@@ -30,12 +30,11 @@ from orchestrator.runs import bundle
 ROOT = Path(__file__).parents[1]
 
 
-def write_ready(folder: Path) -> None:
-    """Make what is ready for use, for all platforms, as `orchestrator.machine.cache` finds it.
+def write_fmus(folder: Path) -> None:
+    """Make the FMUs for all platforms, as `orchestrator.machine.cache` finds them.
 
     Raises:
-        OSError: there is no compiler, or it fails.
-        InputError: the FMUs cannot be built.
+        InputError: they cannot be built.
 
     """
     for fmi in FMI_VERSIONS:
@@ -44,6 +43,16 @@ def write_ready(folder: Path) -> None:
     with loader_for_any_linux():
         place = folder / bundle.CATEGORY / bundle.key_of(PYTHON, FMI_VERSIONS[0])
         bundle.run_fmus("build", place, "--kind", PYTHON, "--loader", "native")
+
+
+def write_programs(folder: Path) -> None:
+    """Make the parts of the live page, and the loop in C, in the same way.
+
+    Raises:
+        OSError: there is no compiler, or it fails.
+        InputError: the page cannot be made.
+
+    """
     sources = bundled().sources
     for category, key, files in (
         (module.CATEGORY, module.key_of(sources), module.compiled(sources)),
@@ -84,28 +93,24 @@ def loader_for_any_linux() -> Iterator[None]:
             os.environ["PATH"] = path
 
 
-def write_wheel(folder: Path) -> Path:
-    """Make the wheel.
-
-    Raises:
-        OSError, InputError: it cannot be made; the text says why.
-
-    """
-    with TemporaryDirectory() as temporary:
-        ready = Path(temporary)
-        write_ready(ready)
-        builder = WheelBuilder(str(ROOT))
-        builder.target_config["force-include"][str(ready)] = "orchestrator/ready"
-        [wheel] = builder.build(directory=str(folder.resolve()))
-        return Path(wheel)
+def write_wheel(folder: Path, ready: Path) -> Path:
+    """Make the wheel of a folder that :func:`write_fmus` and :func:`write_programs` have filled."""
+    builder = WheelBuilder(str(ROOT))
+    builder.target_config["force-include"][str(ready)] = "orchestrator/ready"
+    [wheel] = builder.build(directory=str(folder.resolve()))
+    return Path(wheel)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Make the wheel, and say where it is."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("dist"), metavar="DIR")
+    out = parser.parse_args(arguments).out
     try:
-        print(write_wheel(parser.parse_args(arguments).out))
+        with TemporaryDirectory() as ready:
+            write_fmus(Path(ready))
+            write_programs(Path(ready))
+            print(write_wheel(out, Path(ready)))
     except (OSError, InputError) as error:
         print(f"no wheel: {error}", file=sys.stderr)
         return 2

@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[2]
 each = pytest.mark.parametrize("name", NAMES)
 
 
-@pytest.fixture(params=NAMES)
+@pytest.fixture(params=EACH)
 def fmu(request: pytest.FixtureRequest, dist: Path, tmp_path: Path) -> Iterator[FmuInstance]:
     with unpacked(dist / f"{request.param}.fmu", tmp_path) as instance:
         yield instance
@@ -89,15 +89,6 @@ def test_serialised_state_continues_in_another_instance(fmu: FmuInstance):
         other.fmu.freeInstance()
 
 
-def test_two_instances_do_not_know_of_each_other(fmu: FmuInstance):
-    other = FmuInstance(fmu.folder, "other").initialise()
-    try:
-        expected = fmu.initialise().run(0, 20)
-        assert other.run(0, 20) == expected
-    finally:
-        other.fmu.freeInstance()
-
-
 @pytest.mark.parametrize(
     ("name", "parameter", "variability", "value"),
     [
@@ -126,18 +117,6 @@ def test_no_run_begins_with_another_parameter(dist, tmp_path, name, parameter, v
             fmu.step()
         else:
             assert failure.value.status == fmi2Error
-
-
-def test_all_numbers_can_be_read_with_the_function_for_reals(fmu: FmuInstance):
-    """There are hosts that read all outputs so."""
-    fmu.initialise().run(0, 5)
-    for name, variable in fmu.variables.items():
-        if variable.type != "String":
-            assert fmu.fmu.getReal([variable.reference]) == [float(fmu.get(name))]
-    with pytest.raises(FMICallException):
-        fmu.step(-1.0)
-    assert fmu.fmu.getReal([fmu.variables["fault"].reference]) == [1.0]
-    fmu.step()
 
 
 def test_many_instances_leave_the_interpreter_as_it_was(dist: Path, tmp_path: Path):

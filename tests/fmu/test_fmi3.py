@@ -19,15 +19,10 @@ from fmpy.build import build_platform_binary
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.system.structure import System
 from orchestrator.runs.own_components import build_own
-from orchestrator.runs.scenario import read_scenario
-from orchestrator.runs.wiring import closed_loop
 from support.fmi3 import Fmi3Library, Logger
-from support.kinds import outcome
 from support.raw import Host, Status, initialised, instance
-from support.settings import NAMES
+from support.settings import EACH, NAMES
 from support.status_table import fmi3_rows, names_in_fmi3
 
 H = 0.02
@@ -64,7 +59,7 @@ def test_fmu_is_valid(dist3: Path, name: str):
     assert validate_fmu(str(dist3 / f"{name}.fmu")) == []
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EACH)
 def test_alone_it_does_what_the_python_kind_does(dist: Path, dist3: Path, name: str):
     ours, theirs = (
         fmpy.simulate_fmu(str(folder / f"{name}.fmu"), stop_time=5.0, output_interval=H)
@@ -73,73 +68,6 @@ def test_alone_it_does_what_the_python_kind_does(dist: Path, dist3: Path, name: 
     assert len(ours) == 251
     assert ours.dtype == theirs.dtype
     assert np.array_equal(ours, theirs)
-
-
-def slave_of(folder: Path, name: str) -> FMU3Slave:
-    """An instance in fmpy, about to be initialised."""
-    description = fmpy.read_model_description(str(folder))
-    slave = FMU3Slave(
-        instanceName=name,
-        guid=description.guid,
-        unzipDirectory=str(folder),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-    )
-    slave.instantiate()
-    slave.enterInitializationMode(startTime=0.0)
-    return slave
-
-
-def rows_of(system: System, folder: Path, n: int) -> list[dict[str, float]]:
-    """Outputs after each of n steps, with the inputs that led there, by the simplest of masters."""
-    slaves = {name: slave_of(folder / c.fmu.stem, name) for name, c in system.components.items()}
-    ports = {
-        (name, causality): [
-            variable
-            for variable in fmpy.read_model_description(str(folder / c.fmu.stem)).modelVariables
-            if (variable.causality, variable.type) == (causality, "Float64")
-        ]
-        for name, c in system.components.items()
-        for causality in ("input", "output")
-    }
-    values = {f"{name}.{v.name}": 0.0 for name in slaves for v in ports[name, "input"]}
-
-    def take() -> None:
-        for name, slave in slaves.items():
-            outputs = ports[name, "output"]
-            got = slave.getFloat64([v.valueReference for v in outputs])
-            values.update(zip((f"{name}.{v.name}" for v in outputs), got, strict=True))
-
-    def give() -> None:
-        for wire in system.connections:
-            values[str(wire.target)] = values[str(wire.source)]
-        for name, slave in slaves.items():
-            if inputs := ports[name, "input"]:
-                given = [values[f"{name}.{v.name}"] for v in inputs]
-                slave.setFloat64([v.valueReference for v in inputs], given)
-
-    rows = []
-    # As many exchanges as there are components: nothing depends on more than all others.
-    for _ in slaves:
-        take()
-        give()
-    for slave in slaves.values():
-        slave.exitInitializationMode()
-    for k in range(n + 1):
-        rows.append({**values})
-        give()
-        for slave in slaves.values():
-            slave.doStep(k * H, H)
-        take()
-    return rows
-
-
-def test_loop_of_fig4_is_that_of_the_python_kind(dist: Path, unpacked: Path):
-    ours = outcome(dist, "fig4", {}, Experiment(100.0, H, "jacobi"))
-    rows = rows_of(closed_loop(dist, read_scenario("fig4")), unpacked, 5000)
-    outputs = [i for i, c in enumerate(ours.columns, start=1) if not c.endswith("fault")]
-    theirs = np.array([[row[ours.columns[i - 1]] for i in outputs] for row in rows])
-    assert len(theirs) == 5001
-    assert np.array_equal(ours.rows[:, outputs], theirs)
 
 
 @pytest.mark.slow
@@ -440,6 +368,20 @@ def test_messages_are_no_formats_and_name_no_variables(plant: Fmi3Library):
     assert not host.instantiate(guid=b"50%#1#")
     [message] = host.messages
     assert "token 50%##1## does not match" in message.text
+
+
+def slave_of(folder: Path, name: str) -> FMU3Slave:
+    """An instance in fmpy, about to be initialised."""
+    description = fmpy.read_model_description(str(folder))
+    slave = FMU3Slave(
+        instanceName=name,
+        guid=description.guid,
+        unzipDirectory=str(folder),
+        modelIdentifier=description.coSimulation.modelIdentifier,
+    )
+    slave.instantiate()
+    slave.enterInitializationMode(startTime=0.0)
+    return slave
 
 
 def test_state_continues_in_another_instance_bit_for_bit(unpacked: Path):

@@ -27,7 +27,6 @@ from fmus.python.packaging import build_script, loader_compiler
 from support.fmi3 import Fmi3Library
 from support.kinds import FIXTURES
 from support.raw import (
-    MODEL_EXCHANGE,
     Host,
     Library,
     Message,
@@ -114,24 +113,6 @@ def refused(library: Library, **arguments: Any) -> Message:
     assert sys.path == before
     [message] = host.messages
     return message
-
-
-@pytest.mark.parametrize(
-    ("what", "arguments"),
-    [
-        ("has no name", {"name": None}),
-        *(("name of the instance is not UTF-8", {"name": b"a" + bad}) for bad in NOT_UTF8),
-        ("GUID is not UTF-8", {"guid": b"\xff"}),
-        ("does not match this FMU's", {"guid": b"{}"}),
-        ("co-simulation only", {"kind": MODEL_EXCHANGE}),
-        ("co-simulation only", {"kind": 77}),
-    ],
-)
-def test_instance_that_cannot_be_is_null_with_one_message(library, what, arguments):
-    message = refused(library, **arguments)
-    assert message.text.startswith("fmi2Instantiate: ")
-    assert what in message.text
-    assert (message.status, message.category) == (ERROR, "logStatusError")
 
 
 @pytest.mark.parametrize(
@@ -253,13 +234,6 @@ def test_library_beside_the_loader_is_found_where_the_loader_was(python, tmp_pat
     monkeypatch.chdir(tmp_path / "theirs")
     with instance(library, location=python.location.encode()):
         pass
-
-
-@pytest.mark.parametrize("callbacks", ["none", "no logger"])
-def test_host_without_a_logger_is_survived(library: Library, capfd, callbacks: str):
-    with instance(library, callbacks=callbacks) as host:
-        in_error(host)
-    assert "raw: logStatusError: fmi2SetReal: no array" in capfd.readouterr().err
 
 
 # Arguments

@@ -206,21 +206,6 @@ def test_a_refusal_leaves_nothing_after_a_reset(fmu, kind: str, case: str):
         assert not driven.fault
 
 
-@pytest.mark.parametrize("kind", FMUS)
-def test_a_refused_step_takes_nothing_of_the_noise(fmu, kind: str):
-    """Neither where the equations fail nor where the noise itself leads out of range."""
-    path = fmu(kind, "AuvPlant")
-    with Driven(path) as straight, Driven(path) as refusing:
-        straight.start({"noise.std": 1e-3})
-        refusing.start({"noise.std": 1e-3})
-        for k in range(700):
-            expected = straight.step(k, 0.02)
-            if k % 7 == 0:
-                with pytest.raises(FMICallException):
-                    refusing.step(k, -0.02)
-            assert refusing.step(k, 0.02) == expected, k
-
-
 def test_kinds_agree_on_the_largest_state_to_its_last_bit(fmu):
     random, answers = Random(1), set()
     with Driven(fmu(PYTHON, "AuvPlant")) as python, Driven(fmu(NATIVE, "AuvPlant")) as native:

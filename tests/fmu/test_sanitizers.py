@@ -10,7 +10,7 @@ import pytest
 
 from support.all_types import build
 from support.hosts import GCC, MEMORY, THREADS, arguments_of, sanitized, sanitized_host
-from support.settings import NAMES
+from support.settings import REPRESENTATIVES
 
 pytestmark = [
     pytest.mark.slow,
@@ -34,17 +34,20 @@ def said_by(host: Path, *arguments: str) -> str:
 @pytest.fixture(params=[MEMORY])
 def fmus(request: pytest.FixtureRequest, shared: Path, native: Path) -> dict[str, list[str]]:
     """Arguments of a host for each FMU."""
-    return {name: arguments_of(sanitized(shared, native, name, request.param)) for name in NAMES}
+    return {
+        name: arguments_of(sanitized(shared, native, name, request.param))
+        for name in REPRESENTATIVES
+    }
 
 
 def test_nothing_is_wrong_and_nothing_stays_of_a_run_side_by_side(fmus, tmp_path: Path):
     """With states that are saved, serialised, restored and freed."""
     assert said_by(sanitized_host("host", tmp_path), *chain(*fmus.values())).endswith(
-        f"{len(NAMES)} FMUs, 1000 steps each\n"
+        f"{len(REPRESENTATIVES)} FMUs, 1000 steps each\n"
     )
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", REPRESENTATIVES)
 def test_nothing_is_wrong_whatever_a_host_calls(fmus, tmp_path: Path, name: str):
     """Right and wrong calls in any order."""
     host = sanitized_host("random_calls", tmp_path)
@@ -64,6 +67,6 @@ def test_nothing_is_wrong_with_ports_and_states_of_all_types(tmp_path: Path):
 def test_threads_do_not_touch_the_same(fmus, tmp_path: Path):
     """Each FMU in a thread, and each library in four."""
     host = sanitized_host("threads", tmp_path, THREADS)
-    assert said_by(host, *chain(*fmus.values())) == f"{len(NAMES)} threads\n"
+    assert said_by(host, *chain(*fmus.values())) == f"{len(REPRESENTATIVES)} threads\n"
     for arguments in fmus.values():
         assert said_by(host, *arguments * 4) == "4 threads\n"

@@ -37,9 +37,9 @@ ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "orchestrator", "pythonfmu"},
     "orchestrator": {
-        "auv_fmu", "dask", "distributed", "filelock", "fmpy", "fmus", "libcosimpy", "lxml", "markdown_it",
-        "matplotlib", "mpl_toolkits", "numpy", "onnx", "pandas", "PIL", "platformdirs", "pyarrow",
-        "pydantic", "pydantic_core", "scipy", "tqdm",
+        "auv_fmu", "dask", "distributed", "filelock", "fmpy", "fmus", "libcosimpy", "lxml",
+        "markdown_it", "matplotlib", "mpl_toolkits", "numpy", "onnx", "pandas", "PIL", "platformdirs",
+        "pyarrow", "pydantic", "pydantic_core", "scipy", "tqdm",
     },
 }  # fmt: skip
 

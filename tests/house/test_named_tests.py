@@ -38,6 +38,6 @@ def test_there_are_promises():
     assert len(promises()) > 20
 
 
-@pytest.mark.parametrize("promise", promises())
-def test_every_promise_names_the_test_that_holds_it(promise):
-    assert NAMED.findall(promise)
+def test_every_promise_names_the_test_that_holds_it():
+    for promise in promises():
+        assert any(test for _, test in NAMED.findall(promise)), promise

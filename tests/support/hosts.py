@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -39,9 +39,9 @@ def arguments_of(folder: Path) -> list[str]:
     return [str(library), (folder / "resources").as_uri()]
 
 
-def unpacked(fmus: Path, folder: Path) -> list[str]:
-    """The same of every FMU."""
-    places = [Path(fmpy.extract(fmus / f"{name}.fmu", folder / name)) for name in NAMES]
+def unpacked(fmus: Path, folder: Path, names: Sequence[str] = NAMES) -> list[str]:
+    """The same of every FMU, or of some."""
+    places = [Path(fmpy.extract(fmus / f"{name}.fmu", folder / name)) for name in names]
     return [argument for place in places for argument in arguments_of(place)]
 
 

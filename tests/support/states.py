@@ -1,9 +1,9 @@
 """Serialised states that were tampered with: by their bytes, and by what they say.
 
-What a state says is changed by a grammar: one of its values becomes something else, a key comes,
-goes or is renamed, a part is taken from another state. Its checksum is left as it is or made to fit
-again; with one that fits, what the state says is all that speaks against it. What the format of
-FMUs in C has no place for is changed in their bytes.
+States in JSON are changed by a grammar: a value becomes something else, a key comes, goes or is
+renamed, a part is taken from another state. Words of a state of an FMU in C become others. The
+checksum is left as it is or made to fit again; with one that fits, what the state says is all that
+speaks against it.
 """
 
 from __future__ import annotations
@@ -14,29 +14,36 @@ from collections.abc import Callable, Iterator, Sequence
 from copy import deepcopy
 from math import inf, nan
 from random import Random
-from struct import pack
+from struct import pack, unpack
 from typing import Any, NamedTuple
 
-from support import native_states
-from support.native_states import CHECKSUM, NativeState, Unwritable
+CHECKSUM = "checksum"
 
-#: What differs between states of the two kinds of an FMU that are one.
-OF_THE_KIND = ("identity", "time", CHECKSUM)
+#: How a state of an FMU in C begins: the length of a text, and it.
+_MAGIC = b"FMU state 3"
+_HEAD = pack("<I", len(_MAGIC)) + _MAGIC
 
 Json = Any
 
 
 def read(content: bytes) -> dict[str, Json] | None:
-    """What a state says, if these are the bytes of one."""
+    """The object that a state in JSON is, if these are the bytes of one."""
     try:
         said = json.loads(content)
     except (ValueError, RecursionError):
-        return native_states.read(content)
+        return None
     return said if isinstance(said, dict) else None
 
 
+def is_native(content: bytes) -> bool:
+    """Whether these are the bytes of a state of an FMU in C."""
+    return content.startswith(_HEAD)
+
+
 def without_fault(content: bytes) -> Json:
-    """What can be compared of two states of which one is that of a run with refusals."""
+    """Parts that two states share of which one is that of a run with refusals."""
+    if is_native(content):
+        return content[:-8]  # the last words are the fault and the checksum
     said = read(content)
     if said is None:
         return None
@@ -44,17 +51,28 @@ def without_fault(content: bytes) -> Json:
 
 
 def sealed(said: dict[str, Json]) -> bytes:
-    """Bytes of a state with a checksum that fits."""
-    if isinstance(said, NativeState):
-        return native_states.resealed(written(NativeState({**said, CHECKSUM: 0})))
+    """Bytes of a state in JSON with a checksum that fits."""
     rest = {key: value for key, value in said.items() if key != CHECKSUM}
-    return written({**rest, CHECKSUM: crc32(written(rest))})
+    return _written({**rest, CHECKSUM: crc32(_written(rest))})
 
 
-def written(said: Json) -> bytes:
-    if isinstance(said, NativeState):
-        return native_states.written(said)
+def _written(said: Json) -> bytes:
     return json.dumps(said).encode()
+
+
+def resealed(content: bytes) -> bytes:
+    """Bytes of a state in C with a checksum that fits in the place of the one that they have."""
+    return content[:-4] + pack("<I", crc32(content[:-4]))
+
+
+def with_mode(content: bytes, mode: int) -> bytes:
+    """A state in C in another mode, which is the word after two texts."""
+    [length] = unpack("<I", content[len(_HEAD) : len(_HEAD) + 4])
+    return _with(content, len(_HEAD) + 4 + length, pack("<I", mode))
+
+
+def _with(content: bytes, place: int, more: bytes) -> bytes:
+    return resealed(content[:place] + more + content[place + len(more) :])
 
 
 class Mutant(NamedTuple):
@@ -121,9 +139,11 @@ _ODD_BYTES = (
 
 
 def _overwritten(content: bytes, random: Random) -> bytes:
-    more = random.choice(_ODD_BYTES)
-    place = random.randrange(len(content))
-    return content[:place] + more + content[place + len(more) :]
+    """Words become others; all parts of a state are words, and texts before them."""
+    for _ in range(random.choice((1, 1, 2, 4))):
+        back = 4 * random.randrange(2, len(content) // 4)
+        content = _with(content, len(content) - back, random.choice(_ODD_BYTES))
+    return content
 
 
 # Changes of what is said
@@ -273,26 +293,21 @@ def _with_a_key_twice(content: bytes, random: Random) -> Mutant:
 
 def mutant(content: bytes, random: Random, lenders: Sequence[Json] = ()) -> Mutant:
     """A state that was tampered with; what other states say may take the place of its parts."""
+    if is_native(content) and random.random() < 0.8:
+        return Mutant(_overwritten(content, random), "words overwritten; the checksum fits")
     said = read(content)
     if said is None or random.random() < 0.2:
         name = random.choice([*BYTES])
         return Mutant(BYTES[name](content, random), name)
-    if isinstance(said, NativeState):
-        if random.random() < 0.2:
-            changed = native_states.resealed(_overwritten(content, random))
-            return Mutant(changed, "bytes overwritten; the checksum fits")
-    elif random.random() < 0.05:
+    if random.random() < 0.05:
         return _with_a_key_twice(content, random)
     done: list[str] = []
     fits = random.random() < 0.8
     try:
         for _ in range(random.choice((1, 1, 1, 1, 2, 4))):
-            name = random.choice([*VALUES])
-            one = VALUES[name](said, random, lenders)
+            one = VALUES[random.choice([*VALUES])](said, random, lenders)
             done += [one] if one else []
-        changed = sealed(said) if fits else written(said)
-    except Unwritable:
-        return mutant(content, random, lenders)
+        changed = sealed(said) if fits else _written(said)
     except (OverflowError, ValueError):
         # Integers that no float holds, or with too many digits to be written.
         return Mutant(_flipped(content, random), "bits flipped")
@@ -305,6 +320,9 @@ def mutant(content: bytes, random: Random, lenders: Sequence[Json] = ()) -> Muta
 
 def _impossible(content: bytes, random: Random) -> bytes:
     """Values that no run leads to, with a checksum that fits."""
+    if is_native(content):
+        fault = _with(content, len(content) - 8, pack("<I", 2))
+        return random.choice((fault, with_mode(content, 7), with_mode(content, 2**31)))
     said = read(content)
     if said is None:
         return _noise(content, random)
@@ -326,10 +344,7 @@ def _impossible(content: bytes, random: Random) -> bytes:
             {"state": 5.0},
         )
     )
-    try:
-        return sealed(type(said)({**said, **change}))
-    except Unwritable:
-        return _impossible(content, random)
+    return sealed({**said, **change})
 
 
 def _changed_values(content: bytes, random: Random) -> bytes:

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
+from itertools import cycle
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -44,7 +45,7 @@ KIND = "native"
 ORDERS = ("feedthrough", "jacobi")
 
 #: How many runs of each study are tried, and how many steps of each.
-SAMPLES, STEPS = 100, 40
+SAMPLES, STEPS = 40, 40
 
 
 @cache
@@ -149,8 +150,7 @@ def test_fleets_are_those_of_the_fmus(name, order):
     assert outcome.indices["smallest_distance"] > 0.0
 
 
-@pytest.mark.parametrize("start", [-1.0, 10.0])
-@pytest.mark.parametrize("name", ["fig4", "sea", "path"])
+@pytest.mark.parametrize(("name", "start"), [("fig4", -1.0), ("path", 10.0)])
 def test_start_times_are_those_of_the_fmus(tmp_path, name, start):
     times = {"start_time": start, "stop_time": start + 4.0, "step": 0.02}
     write_ssp(replace(systems(name)[name], name="later", **times), tmp_path)
@@ -158,8 +158,10 @@ def test_start_times_are_those_of_the_fmus(tmp_path, name, start):
     compare_with_fmus(str(tmp_path / "later.ssp"), point)
 
 
-@pytest.mark.parametrize("order", ["feedthrough", "jacobi", PLANTS_FIRST], ids=str)
-@pytest.mark.parametrize("slow", ["controller = 0.2", "planner = 0.06\ndisturbance = 0.04"])
+@pytest.mark.parametrize(
+    ("slow", "order"),
+    [("controller = 0.2", "jacobi"), ("planner = 0.06\ndisturbance = 0.04", PLANTS_FIRST)],
+)
 def test_components_with_longer_steps_are_those_of_the_fmus(tmp_path, slow, order):
     path = tmp_path / "slow.toml"
     path.write_text(f"stop_time = 4.0\n[steps]\n{slow}\n")
@@ -203,8 +205,7 @@ OTHERS = {
 }
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("name", OTHERS)
+@pytest.mark.parametrize(("name", "order"), zip(OTHERS, cycle(ORDERS), strict=False))
 def test_other_systems_are_those_of_the_fmus(tmp_path, name, order):
     path = tmp_path / "own.toml"
     path.write_text(OTHERS[name])
@@ -251,9 +252,9 @@ ADDITIONS: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize(("name", "values"), ADDITIONS)
-def test_additions_are_those_of_the_fmus(name, values, order):
+@pytest.mark.parametrize(("of", "order"), zip(ADDITIONS, cycle(ORDERS), strict=False))
+def test_additions_are_those_of_the_fmus(of, order):
+    name, values = of
     compare_with_fmus(name, Point(0, name, values, 2.01, 0.02, order))
 
 
@@ -287,9 +288,9 @@ MISTAKES: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize(("name", "values"), MISTAKES)
-def test_what_fmus_refuse_is_refused(name, values, order):
+@pytest.mark.parametrize(("of", "order"), zip(MISTAKES, cycle(ORDERS), strict=False))
+def test_what_fmus_refuse_is_refused(of, order):
+    name, values = of
     point = Point(5, name, values, 3.0, 0.02, order)
     [[one], [other]] = (engine.outcomes([point]) for engine in engines(name))
     assert other.failure
@@ -342,8 +343,7 @@ def outputs(inputs: Inputs) -> Outputs:
 """
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_what_a_loop_would_never_end_with_is_refused_before(workplace, order):
+def test_what_a_loop_would_never_end_with_is_refused_before(workplace):
     for name, text in (("scaled", SCALED), ("halved", HALVED)):
         Path(f"{name}.py").write_text(text)
         assert main(["build", f"{name}.py", "--kind", KIND]) == 0
@@ -352,9 +352,9 @@ def test_what_a_loop_would_never_end_with_is_refused_before(workplace, order):
         '[wires]\n"scaled.x" = "planner.y_d.x"\n"halved.x" = "scaled.y"\n'
     )
     path = str(Path("own.toml").resolve())
-    compare_with_fmus(path, Point(0, "", {}, 4.01, 0.02, order))
+    compare_with_fmus(path, Point(0, "", {}, 4.01, 0.02, "jacobi"))
     # The reference comes beyond x = 1.1 m after 5.4 s.
-    point = Point(0, path, {"scaled.k": 1.7e308}, 20.0, 0.02, order)
+    point = Point(0, path, {"scaled.k": 1.7e308}, 20.0, 0.02, "jacobi")
     assert [*BatchEngine({path: load(path, KIND)}).outcomes([point])] == [(0, {}, REFUSED, None)]
 
 

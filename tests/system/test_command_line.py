@@ -49,10 +49,11 @@ def test_build_replaces_what_is_not_what_was_built(dist, workplace, refused, cap
 
 
 def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace, monkeypatch):
-    bundle.current_fmus()
     # Other tests read the one that all share.
-    cache = shutil.copytree(users_folder(), workplace / "cache" / users_folder().name)
-    monkeypatch.setenv("XDG_CACHE_HOME", str(cache.parent))
+    folder = bundle.current_fmus()
+    cache = workplace / "cache"
+    shutil.copytree(folder, cache / folder.relative_to(users_folder().parent))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(cache))
     bundle.current_fmus.cache_clear()
     try:
         fmu = bundle.current_fmus() / "AuvPlant.fmu"

@@ -42,11 +42,9 @@ H = 0.5
 #: Orders that any system can be run in; None: the first, or the second where its FMUs want that.
 ANY = (None, "gauss-seidel", "jacobi")
 
-WAYS = pytest.mark.parametrize(
-    "way",
-    [{"loop": "python"}, {"loop": "compiled"}, {"loop": "python", "isolation": Isolation(20.0)}],
-    ids=["python", "compiled", "isolated"],
-)
+ISOLATED = pytest.param({"loop": "python", "isolation": Isolation(20.0)}, marks=pytest.mark.slow)
+HERE = [{"loop": loop} for loop in LOOPS]
+WAYS = pytest.mark.parametrize("way", [*HERE, ISOLATED], ids=["python", "compiled", "isolated"])
 
 
 @pytest.fixture(scope="module")
@@ -171,7 +169,7 @@ FED = {
 }
 
 
-@WAYS
+@pytest.mark.parametrize("way", HERE, ids=LOOPS)
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize(
     ("factor", "target", "bias", "words"),

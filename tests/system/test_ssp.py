@@ -11,7 +11,6 @@ from fmpy.ssp.simulation import simulate_ssp
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim.formats.ssp.writer import structure_xml, write_ssp
-from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from support.archives import (
     archive,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from math import inf, nan
-from random import Random
 
 import pytest
 from pythonfmu.enums import Fmi2Status
@@ -13,8 +12,6 @@ from fmus.python.slave import slave_of
 from support import integrator
 from support.instances import answers_of, messages_of
 from support.own import imported
-from support.variants_of_hooks import Hooks
-from support.variants_of_hooks import component as component_of
 
 #: References of the ports.
 A, B, C = [0, 1], [2, 3], [4]
@@ -34,63 +31,6 @@ def initialised(slave, t=0.0):
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
     return slave
-
-
-def test_inputs_and_parameters_reach_the_equations_and_outputs_the_host(slave):
-    slave.set_real(A, [1.0, -2.0])
-    initialised(slave, 3.0)
-    assert slave.get_real(B + C) == [1.0, -2.0, 3.0]
-    slave.set_real([5], [4.0])
-    assert slave.do_step(3.0, 0.5)
-    assert slave.get_real(B + C) == pytest.approx([3.0, -6.0, 3.5])
-
-
-def test_truth_values_reach_the_equations(slave):
-    slave.set_boolean([6], [False])
-    assert slave.get_boolean([6]) == [False]
-    initialised(slave)
-    slave.set_real(A, [2.0, 4.0])
-    assert slave.do_step(0.0, 0.5)
-    assert slave.get_real(B) == pytest.approx([-1.0, -2.0])
-
-
-def test_fixed_parameter_stays_what_it_was_at_the_start(slave):
-    initialised(slave).set_boolean([6], [False])
-    said = "up is fixed and cannot change after initialisation"
-    assert messages_of(slave) == [said]
-    assert answers_of(slave) == [Fmi2Status.error]
-    assert slave.get_boolean([6]) == [True]
-
-
-def test_fixed_parameter_may_be_set_to_what_it_is(slave):
-    initialised(slave).set_boolean([6], [True])
-    slave.set_real([H_MAX, GAIN], [integrator.H_MAX, 3.0])
-    assert slave.log_queue == []
-    assert slave.get_real([5]) == [3.0], "the others of the call are taken"
-
-
-def test_outputs_at_the_start_follow_every_value_that_is_set_until_then(slave):
-    slave.setup_experiment(0.0)
-    slave.enter_initialization_mode()
-    for value in (5.0, 6.0):
-        slave.set_real([0], [value])
-        assert slave.get_real([2]) == [value]
-        assert slave._get_fmu_state()["state"] == ((value, 0.0),)
-        slave.set_real(A, [-value, 1.0])
-        assert slave.get_real(B) == [-value, 1.0]
-        slave.set_real([1], [0.0])
-    slave.exit_initialization_mode()
-    slave.set_real([0], [7.0])
-    assert slave.get_real(B) == [-6.0, 0.0]
-
-
-def test_all_inputs_in_one_call_are_refused_after_the_end_as_one_is(slave):
-    initialised(slave).terminate()
-    slave.set_real(A, [1.0, 2.0])
-    slave.set_real(A[:1], [1.0])
-    assert slave.get_real(A) == [0.0, 0.0]
-    assert messages_of(slave) == ["fmi2SetReal is not allowed when terminated"]
-    assert answers_of(slave) == [Fmi2Status.error] * 2
 
 
 def test_what_equations_raise_is_named_and_logged_once_whatever_the_time(slave, monkeypatch):
@@ -116,17 +56,6 @@ def test_the_last_message_says_that_it_is_the_last(slave, monkeypatch):
     assert answers_of(slave) == [Fmi2Status.error] * 3
     assert first == "no Real has the value reference 97"
     assert last == "no Real has the value reference 98; further messages are not logged"
-
-
-def test_without_a_loader_only_a_state_leads_out_of_a_refused_one(slave):
-    slave._has_loader = False
-    saved = initialised(slave)._get_fmu_state()
-    slave._set_fmu_state({})
-    assert slave._get_fmu_state() == saved
-    slave.set_real(A, [0.0, 0.0])
-    assert not slave.do_step(0.0, 0.1)
-    slave._set_fmu_state(saved)
-    assert slave.do_step(0.0, 0.1)
 
 
 def test_parameters_that_do_not_fit_are_refused_before_a_step_and_leave_the_others(slave):
@@ -168,40 +97,6 @@ def test_largest_number_of_internal_steps_is_allowed(slave, monkeypatch):
     assert "needs more than 3 internal steps" in slave.log_queue[0].msg
 
 
-def test_one_bad_value_among_good_ones_leaves_all_as_they_were(slave):
-    initialised(slave)
-    before = slave._get_fmu_state()
-    for references, values, status in (
-        ([0, 1], [5.0, nan], Fmi2Status.discard),
-        ([0, 5, 2], [5.0, 2.0, 1.0], Fmi2Status.error),
-        ([0, 5, 99], [5.0, 2.0, 1.0], Fmi2Status.error),
-        ([99, 1], [5.0, nan], Fmi2Status.error),
-        ([1, 99], [nan, 5.0], Fmi2Status.error),
-    ):
-        slave.log_queue.clear()
-        slave.set_real(references, values)
-        assert answers_of(slave) == [status]
-        assert {**slave._get_fmu_state(), "fault": False} == before
-    assert slave.do_step(0.0, 0.1)
-
-
-def test_values_that_the_host_brings_are_its_own(slave):
-    """It may reuse its list for the next call."""
-    values = [1.0, 2.0]
-    initialised(slave).set_real(A[:1], values[:1])
-    kept = slave._store.inputs
-    slave.set_real(A[1:], [2.0])
-    assert kept == [1.0, 0.0]
-    assert slave.get_real(A) == [1.0, 2.0]
-
-
-def test_description_is_that_of_the_ports_and_knows_no_time_of_its_build(slave):
-    root = slave.to_xml()
-    assert "generationDateAndTime" not in root.attrib
-    names = [variable.get("name") for variable in root.iter("ScalarVariable")]
-    assert names == [*(port.name for port in slave.definition.ports), "fault"]
-
-
 def test_without_a_loader_a_step_tells_the_first_refusal(slave):
     slave._has_loader = False
     initialised(slave).setup_experiment(0.0)
@@ -209,36 +104,6 @@ def test_without_a_loader_a_step_tells_the_first_refusal(slave):
     slave.get_string([0])
     assert not slave.do_step(0.0, 0.1)
     assert slave._failure == "fmi2SetupExperiment is not allowed when stepping"
-
-
-def test_values_that_give_no_start_are_refused_by_what_needs_one(slave):
-    """Others may be on their way: what only reads them on has no consequence."""
-    slave.setup_experiment(0.0)
-    slave.set_real([5], [10.0])
-    slave.enter_initialization_mode()
-    assert slave.log_queue == []
-    assert slave.get_real([5]) == [10.0]
-    assert slave.get_boolean([FAULT]) == [False]
-    assert slave.log_queue == []
-    assert slave.get_real([5, 2]) == [10.0, 0.0]
-    slave.exit_initialization_mode()
-    assert messages_of(slave) == ["initialisation refused: too much"]
-    assert answers_of(slave) == [Fmi2Status.error] * 2
-    assert slave.get_boolean([FAULT]) == [False]
-    assert slave._get_fmu_state()["mode"] == "initialising"
-    slave.set_real([5], [9.0])
-    slave.exit_initialization_mode()
-    assert slave.do_step(0.0, 0.1)
-
-
-def test_experiment_that_is_not_set_up_starts_at_zero(slave):
-    slave.enter_initialization_mode()
-    assert slave.get_real(C) == [0.0]
-
-
-def test_fault_can_be_read_among_others(slave):
-    assert initialised(slave).get_boolean([6, FAULT]) == [True, False]
-    assert slave.get_real([FAULT, 6]) == [0.0, 1.0], "and as a number"
 
 
 def test_state_of_whole_numbers_is_bounded_as_one_of_floats(slave):
@@ -274,22 +139,6 @@ def test_outputs_that_are_not_finite_refuse_the_step(monkeypatch, tmp_path, b):
     assert slave._get_fmu_state() == {**before, "fault": True}
 
 
-@pytest.mark.parametrize("start", [nan, inf, -inf])
-def test_experiment_without_a_start_leaves_the_one_before(slave, start):
-    slave.setup_experiment(2.0)
-    slave.setup_experiment(start)
-    assert messages_of(slave) == [f"start time {start}: must be finite"]
-    assert answers_of(slave) == [Fmi2Status.error]
-    slave.enter_initialization_mode()
-    assert slave.get_real(C) == [2.0]
-
-
-def test_instances_share_one_class_that_is_named_like_the_component():
-    made = slave_of("Integrator", integrator)
-    assert slave_of("Integrator", integrator) is made
-    assert (made.__module__, made.__name__) == ("support", "Integrator")
-
-
 #: A lag whose output is all that has an input in it, and refuses some.
 SEEN = (
     ("def outputs(state: State)", "def outputs(state: State, inputs: Inputs)"),
@@ -304,75 +153,11 @@ def seen(monkeypatch, tmp_path, *changes):
     return initialised(slave)
 
 
-def test_outputs_follow_inputs_without_a_step(monkeypatch, tmp_path):
-    slave = seen(monkeypatch, tmp_path)
-    for u in (0.5, 3.0):
-        slave.set_real([0], [u])
-        assert slave.get_real([1]) == [1.0 + u]
-    assert slave.do_step(0.0, 0.1)
-    [x] = slave._get_fmu_state()["state"]
-    assert slave.get_real([1]) == [x + 3.0]
-
-
-def test_outputs_of_a_sampled_component_are_those_before_the_step(monkeypatch, tmp_path):
-    slave = seen(monkeypatch, tmp_path, ("class Parameters", "SAMPLED = True\n\nclass Parameters"))
-    slave.set_real([0], [3.0])
-    assert slave.do_step(0.0, 0.1)
-    assert slave.get_real([1]) == [4.0]
-    saved = slave._get_fmu_state()
-    slave.set_real([0], [3.0])
-    [x] = saved["state"]
-    assert slave.get_real([1]) == [x + 3.0]
-    slave._set_fmu_state(saved)
-    assert slave.get_real([1]) == [4.0]
-    assert slave.do_step(0.1, 0.1)
-    assert slave.get_real([1]) == [x + 3.0], "whether or not an input was set"
-
-
-def test_outputs_that_are_refused_are_the_last_ones(monkeypatch, tmp_path):
-    slave = seen(monkeypatch, tmp_path)
-    for u in (9.0, 10.0):
-        slave.set_real([0], [u])
-        assert slave.get_real([0, 1]) == [u, 1.0]
-    assert messages_of(slave) == ["outputs refused: too far"]
-    assert answers_of(slave) == [Fmi2Status.error] * 2
-    assert slave.get_boolean([4]) == [True]
-    assert slave.do_step(0.0, 0.1), "they are evaluated when they are read"
-    slave.set_real([0], [0.0])
-    assert slave.get_real([1]) == [slave._get_fmu_state()["state"].x]
-
-
 def test_state_is_asked_whether_a_run_can_have_led_to_it(slave):
     saved = initialised(slave)._get_fmu_state()
     slave._set_fmu_state({**saved, "state": ((123.0, 0.0),)})
     assert messages_of(slave) == ["state refused: it is not reached"]
     assert slave._get_fmu_state() == saved
-
-
-def test_a_run_goes_on_from_another_state_where_one_is_not_credible(monkeypatch, tmp_path):
-    guard = (
-        'RESTARTED = "restarted at {t:g}"\n\n'
-        "def credible(state: State, inputs: Inputs) -> bool:\n    return inputs.u < 2.0\n\n"
-        "def restarted(state: State) -> State:\n    return State(-state.x)\n\n"
-        "def derive(state: State) -> float:\n    return 10.0 * state.x\n\ndef outputs(state: State)"
-    )
-    changes = [
-        (
-            "def outputs(state: State)",
-            guard.replace("outputs(state: State)", "outputs(derived: float)"),
-        ),
-        ("Outputs(state.x)", "Outputs(derived)"),
-    ]
-    slave = slave_of("Lag", imported(monkeypatch, tmp_path, *changes))(instance_name="lag")
-    initialised(slave)
-    for u, x in ((1.0, 10.0), (3.0, -10.0), (1.0, 10.0)):
-        slave.set_real([0], [u])
-        assert slave.get_real([1]) == [x]
-    assert slave.log_queue == []
-    slave.set_real([0], [3.0])
-    assert slave.do_step(0.0, 1e-9)
-    assert messages_of(slave) == ["restarted at 0"]
-    assert slave._get_fmu_state()["state"].x == pytest.approx(-1.0)
 
 
 #: A lag whose output has noise, which the input can make too large.
@@ -392,19 +177,6 @@ def noisy(monkeypatch, tmp_path):
     return slave_of("Lag", imported(monkeypatch, tmp_path, *NOISE))
 
 
-def test_noise_is_drawn_at_the_start_and_in_each_step_that_is_taken(monkeypatch, tmp_path):
-    made, gauss = noisy(monkeypatch, tmp_path), Random(3).gauss
-    slave = initialised(made(instance_name="lag"))
-    for k in range(1200):
-        n = [gauss(0.0, 1.0) for _ in range(2)]
-        x = slave._get_fmu_state()["state"].x if k % 400 == 0 else slave._store.state.x
-        assert slave.get_real([1]) == [x + 0.0 * n[0] + n[1]]
-        slave.set_real([0], [1e9])
-        assert k % 300 or not slave.do_step(k * 0.1, 10.0), "it takes none"
-        slave.set_real([0], [1.0])
-        assert slave.do_step(k * 0.1, 0.1)
-
-
 @pytest.mark.parametrize("draws", [[0.0, 9.1], [0.0, nan], [0.0], [0.0, "1"], None])
 def test_noise_that_cannot_be_drawn_is_refused(monkeypatch, tmp_path, draws):
     slave = initialised(noisy(monkeypatch, tmp_path)(instance_name="lag"))
@@ -413,12 +185,3 @@ def test_noise_that_cannot_be_drawn_is_refused(monkeypatch, tmp_path, draws):
     [message] = messages_of(slave)
     assert message.startswith("state refused: ")
     assert slave._get_fmu_state() == saved
-
-
-def test_parameters_change_the_noise_of_outputs_that_are_sampled():
-    noise = Hooks(("inputs",), None, True, False, False, True)
-    slave = initialised(slave_of("Variant", component_of(noise))(instance_name="noisy"))
-    assert slave.do_step(0.0, 0.1)
-    [before] = slave.get_real([1])
-    slave.set_real([3], [2.0])
-    assert slave.get_real([1]) != [before]

@@ -17,16 +17,11 @@ from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.variable import Refusal
 from fmus.python.state import Snapshot, measuring, restored
 from support.instances import ClassInstance
-from support.settings import NAMES, WITH_INPUTS
+from support.settings import REPRESENTATIVES
 
 
-@pytest.fixture(params=NAMES)
+@pytest.fixture(params=REPRESENTATIVES)
 def driver(request: pytest.FixtureRequest) -> ClassInstance:
-    return ClassInstance(request.param)
-
-
-@pytest.fixture(params=WITH_INPUTS)
-def driven(request: pytest.FixtureRequest) -> ClassInstance:
     return ClassInstance(request.param)
 
 
@@ -141,35 +136,11 @@ def test_state_that_no_run_can_have_led_to_is_refused_whole(what: str):
     assert plant.outputs() == untouched.outputs(), "a good state is taken after a bad one"
 
 
-@pytest.mark.parametrize("key", Snapshot.__annotations__)
-def test_state_with_a_part_missing_is_refused(driver, key):
-    saved = dict(driver.slave._get_fmu_state())
-    del saved[key]
-    driver.slave._set_fmu_state(saved)
-    assert driver.answers() == [Fmi2Status.error]
-
-
-#: Bytes that are no state at all.
-NO_STATES = {
-    "nothing": b"",
-    "no text": b"\x00 not a state \xff",
-    "a list": b"[1, 2]",
-    "a number": b"1",
-    "two thousand lists": b"[" * 2000,
-    "a hundred thousand objects": b'{"a":' * 100_000,
-    "half a number": b'{"mode": 1e',
-    "a number without end": b'{"start_time": ' + b"9" * 10_000 + b"}",
-    "an empty object": b"{}",
-}
-
-
-@pytest.mark.parametrize("what", NO_STATES)
-def test_bytes_that_are_no_state_are_refused(driver, what):
-    before = driver.slave._get_fmu_state()
-    driver.slave._set_fmu_state(driver.slave._fmu_state_from_bytes(NO_STATES[what]))
-    assert driver.answers() == [Fmi2Status.error]
-    assert driver.slave._get_fmu_state() == before
-    assert driver.get("fault") is False
+def test_state_with_a_part_missing_is_refused(driver):
+    saved = driver.slave._get_fmu_state()
+    for key in saved:
+        driver.slave._set_fmu_state({k: value for k, value in saved.items() if k != key})
+    assert driver.answers() == [Fmi2Status.error] * len(Snapshot.__annotations__)
 
 
 @given(place=st.integers(0), byte=st.integers(0, 255))
@@ -201,66 +172,6 @@ def test_text_of_a_state_is_no_trap_for_the_message(driver):
     assert len(message) < 600
 
 
-@pytest.mark.parametrize("plain", [False, True])
-def test_state_that_is_saved_after_a_refusal_is_a_state_like_any(driver, plain):
-    """Without a loader it leads out of the steps that are discarded."""
-    driver.slave._has_loader = not plain
-    driver.slave._set_fmu_state({})
-    assert driver.step() is not plain
-    saved = driver.slave._get_fmu_state()
-    driver.slave._set_fmu_state(saved)
-    assert driver.slave._get_fmu_state() == saved
-    assert driver.step()
-
-
-def test_fault_is_that_of_the_state_that_is_restored(driver):
-    sound = driver.slave._get_fmu_state()
-    assert not driver.slave.do_step(0.0, -1.0)
-    faulty = driver.slave._get_fmu_state()
-    for saved, fault in ((sound, False), (faulty, True)):
-        driver.slave._set_fmu_state(saved)
-        assert driver.get("fault") is fault
-
-
-def test_state_before_the_first_step_is_that_of_its_parameters_and_inputs(driver):
-    """Whatever else is said of it: it is computed again."""
-    slave = driver.component(instance_name="initialising")
-    slave.setup_experiment(0.0)
-    slave.enter_initialization_mode()
-    true = slave._get_fmu_state()
-    driver.excite(1)
-    driver.step(0.02)
-    driver.slave._set_fmu_state({**driver.slave._get_fmu_state(), "mode": "initialising",
-                                 "time": 0.0, "inputs": true["inputs"]})  # fmt: skip
-    assert driver.slave._get_fmu_state() == true
-
-
-def test_state_from_before_the_initialisation_brings_an_instance_back_there(driver):
-    fresh = driver.component(instance_name="fresh")
-    driver.slave._set_fmu_state(fresh._get_fmu_state())
-    assert not driver.slave.do_step(0.0, 0.02)
-    assert driver.answers() == [Fmi2Status.error]
-    driver.slave.enter_initialization_mode()
-    driver.slave.exit_initialization_mode()
-    assert driver.step()
-    other = ClassInstance(driver.component.__name__)
-    other.step()
-    assert driver.outputs() == other.outputs()
-
-
-@pytest.mark.parametrize("serialised", [False, True])
-def test_run_continued_from_a_state_is_the_same_run_bit_for_bit(driver, serialised):
-    driver.run(0, 50)
-    saved, time = driver.slave._get_fmu_state(), driver.time
-    if serialised:
-        saved = driver.component._fmu_state_from_bytes(driver.component._fmu_state_to_bytes(saved))
-    expected = driver.run(50, 100)
-    for other in (driver, ClassInstance(driver.component.__name__)):
-        other.slave._set_fmu_state(saved)
-        other.time = time
-        assert other.run(50, 100) == expected
-
-
 #: What is not in the paper, in a run of AuvPlant.
 ADDITIONS = {"roll": False, "current__x": 0.3, "actuator__T__u": 0.2, "actuator__T__q": 1e-3}
 
@@ -286,26 +197,6 @@ def test_state_that_rolls_is_none_of_a_vehicle_that_does_not():
     assert "its roll, which is held at zero, is not zero" in other.messages()[0]
 
 
-def test_state_holds_parameters_faults_and_inputs(driven):
-    driven.slave.set_real([0], [0.75])
-    driven.slave.set_real([1], [nan])
-    other = ClassInstance(driven.component.__name__)
-    other.slave._set_fmu_state(driven.slave._get_fmu_state())
-    assert other.get("fault") is True
-    assert other.slave.get_real([0]) == [0.75]
-    assert other.messages() == []
-    assert other.step()
-
-
-def test_state_of_another_component_or_version_is_refused(driver):
-    driver.step()
-    before = driver.slave._get_fmu_state()
-    driver.slave._set_fmu_state({**before, "identity": "something else"})
-    driver.slave._set_fmu_state({})
-    assert driver.answers() == [Fmi2Status.error] * 2
-    assert driver.slave._get_fmu_state() == before
-
-
 def test_state_whose_initialisation_was_refused_is_one_of_an_instance_that_can_go_on():
     driver = ClassInstance("AuvPlant", nu0__p=1e160)
     saved = driver.slave._fmu_state_from_bytes(
@@ -323,16 +214,6 @@ def test_state_whose_initialisation_was_refused_is_one_of_an_instance_that_can_g
     calm = ClassInstance("AuvPlant")
     calm.step()
     assert other.outputs() == calm.outputs()
-
-
-def test_saved_state_does_not_change_with_the_run(driver):
-    driver.excite(1)
-    driver.step()
-    saved = driver.slave._get_fmu_state()
-    text = json.dumps(saved)
-    driver.excite(2)
-    driver.step()
-    assert json.dumps(saved) == text
 
 
 class Pair(NamedTuple):
