@@ -38,8 +38,8 @@ ALLOWED = {
     "fmus": {"auv_fmu", "markdown_it", "orchestrator", "pythonfmu"},
     "orchestrator": {
         "auv_fmu", "dask", "distributed", "filelock", "fmpy", "fmus", "libcosimpy", "lxml",
-        "markdown_it", "matplotlib", "mpl_toolkits", "numpy", "onnx", "pandas", "PIL", "platformdirs",
-        "pyarrow", "pydantic", "pydantic_core", "scipy", "tqdm",
+        "markdown_it", "matplotlib", "mpl_toolkits", "numpy", "onnx", "pandas", "PIL",
+        "platformdirs", "pyarrow", "pydantic", "pydantic_core", "scipy", "tqdm",
     },
 }  # fmt: skip
 
