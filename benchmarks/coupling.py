@@ -17,7 +17,7 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.cosim.experiment import COUPLINGS, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.loop import choose_loop, compile_stepper
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
@@ -84,7 +84,7 @@ def main() -> None:
         )
         for gain in (0.45, -0.81, -2.0, 6.0):
             system = _ring(folder, gain)
-            for coupling in COUPLINGS[:2]:
+            for coupling in Experiment.COUPLINGS[:2]:
                 errors = []
                 for h in steps:
                     table = Table()

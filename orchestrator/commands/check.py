@@ -13,7 +13,6 @@ from fmpy.validation import validate_fmu
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
 from orchestrator.cosim.fmi.binary import binary_of, check_binary
-from orchestrator.cosim.formats.osp import OSP_STRUCTURE
 from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
@@ -79,7 +78,7 @@ def _is_own(path: Path) -> bool:
 
     A folder with a system or an FMU is not, whatever else is in it.
     """
-    others = (OSP_STRUCTURE, "modelDescription.xml")
+    others = ("OspSystemStructure.xml", "modelDescription.xml")
     if any((path / name).is_file() for name in others) or any(path.glob("*.ssd")):
         return False
     return path.suffix == ".py" or (path / f"{path.resolve().name}.py").is_file()

@@ -21,7 +21,10 @@ from orchestrator.commands.options import (
     read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, describe, say, show
-from orchestrator.cosim.experiment import INITIAL, ORDERS, read_order
+from orchestrator.cosim.experiment import (
+    INITIAL,
+    Experiment,
+)
 from orchestrator.cosim.formats.osp import write_osp
 from orchestrator.cosim.formats.ssp.writer import write_ssp
 from orchestrator.exchange.carried import Carried
@@ -162,11 +165,11 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--order",
-        type=read_order,
-        metavar=f"{'|'.join(ORDERS)}|NAME,...",
-        help=f"order in which the tool steps the components: {', '.join(ORDERS)}, or the names of "
-        f"all components, joined by + where they are stepped side by side; default: whichever of "
-        f"{', '.join(ORDERS)} matches better",
+        type=Experiment.read_order,
+        metavar=f"{'|'.join(Experiment.ORDERS)}|NAME,...",
+        help="order in which the tool steps the components: "
+        f"{', '.join(Experiment.ORDERS)}, or the names of all components, joined by + where they are stepped side by side; default: whichever of "
+        f"{', '.join(Experiment.ORDERS)} matches better",
     )
     parser.add_argument(
         "--initial",

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, floor, isfinite, ulp
 from numbers import Real
-from typing import Literal, NamedTuple, TypeAlias, cast, get_args
+from typing import ClassVar, Literal, NamedTuple, TypeAlias, cast, get_args
 
 from orchestrator.machine.errors import InputError
 
@@ -36,19 +36,6 @@ ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
 
 #: More steps than this are taken for a mistake.
 MOST_STEPS = 1_000_000_000
-
-
-def read_order(text: str) -> Order:
-    """Read an order as a command line has it: one of :data:`ORDERS`, or names with commas."""
-    if "," in text:
-        return tuple(name.strip() for name in text.split(","))
-    # Any other name is refused by the experiment.
-    return cast(OrderName, text)
-
-
-def format_order(order: Order | None) -> str:
-    """Write an order as a command line has it; empty: none is stated."""
-    return order if isinstance(order, str) else ",".join(order or ())
 
 
 class Exchange(NamedTuple):
@@ -91,6 +78,26 @@ class Experiment:
     order: Order | None = None
     start_time: float = 0.0
     coupling: str | None = None
+
+    #: Names that an order and a coupling may have.
+    ORDERS: ClassVar[tuple[OrderName, ...]] = ORDERS
+    COUPLINGS: ClassVar[tuple[CouplingName, ...]] = COUPLINGS
+
+    #: A difference of times that is smaller than this share of them is a rounding error.
+    ROUNDING: ClassVar[float] = ROUNDING
+
+    @staticmethod
+    def read_order(text: str) -> Order:
+        """Read an order as a command line has it: one of :data:`ORDERS`, or names with commas."""
+        if "," in text:
+            return tuple(name.strip() for name in text.split(","))
+        # Any other name is refused by the experiment.
+        return cast(OrderName, text)
+
+    @staticmethod
+    def format_order(order: Order | None) -> str:
+        """Write an order as a command line has it; empty: none is stated."""
+        return order if isinstance(order, str) else ",".join(order or ())
 
     def __post_init__(self) -> None:
         """Refuse what cannot be run."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.cosim.experiment import ROUNDING
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.values import Value
@@ -95,7 +95,7 @@ def comparison(
     if not expected.columns:
         raise InputError("none of the columns of its results is an output")
     times, ours = expected.times, table.time
-    slack = ROUNDING * max(1.0, float(np.abs(ours).max()))
+    slack = Experiment.ROUNDING * max(1.0, float(np.abs(ours).max()))
     new = np.diff(times, prepend=-np.inf) > slack
     chosen = new & (times >= ours[0] - slack) & (times <= ours[-1] + slack)
     if not chosen.any():

@@ -13,12 +13,9 @@ from typing import NamedTuple
 import numpy as np
 
 from orchestrator.cosim.experiment import (
-    ORDERS,
-    ROUNDING,
     Exchange,
     Experiment,
     Order,
-    format_order,
 )
 from orchestrator.cosim.hooks.events import Event, Events
 from orchestrator.cosim.hooks.hook import Hook, Run
@@ -138,7 +135,7 @@ def verify(
         tolerance: largest difference that is accepted, relative to the larger of one and the
             largest magnitude of the port.
         order: in which the tool steps the components, with `a+b` for some that it steps side by
-            side; None: one of :data:`ORDERS`.
+            side; None: one of :data:`Experiment.ORDERS`.
         events: that have happened in its run.
         initial: what it exchanges before the first step.
         verbose: whether all names of what was not compared are said.
@@ -236,15 +233,17 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
         groups = [name.split("+") for name in order]
         names = tuple(chain(*groups))
         system.check_order(names)
-        words = f"in the order {format_order(order)}, each with the latest outputs{start}"
+        words = (
+            f"in the order {Experiment.format_order(order)}, each with the latest outputs{start}"
+        )
         yield Algorithm(names, None, exchange._replace(groups=groups), words)
         if names != tuple(order):
             return
     # Other tools solve rings, or delay them.
     for coupling in (None, "delay") if system.rings() else (None,):
         delayed = ", rings delayed" * (coupling == "delay")
-        for one in ORDERS if order is None else (order,):
-            named = format_order(one)
+        for one in Experiment.ORDERS if order is None else (order,):
+            named = Experiment.format_order(one)
             words = f"in {named} order" if isinstance(one, str) else f"as run --order {named}"
             yield Algorithm(one, coupling, exchange, f"{words}{delayed}{start}")
 
@@ -447,7 +446,7 @@ def _table(
             columns[port].append(_value(row[place], ports[port], f"{where}, {names[place]}"))
     others = [name for i, name in enumerate(names) if i not in (*clocks, *places.values())]
     times = np.array(time)
-    new = np.diff(times, prepend=-np.inf) > ROUNDING * np.abs(times)
+    new = np.diff(times, prepend=-np.inf) > Experiment.ROUNDING * np.abs(times)
     return ForeignTable(
         times[new],
         {port: np.array(column)[new] for port, column in columns.items()},

@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from orchestrator.cosim.observers.observer import matches, matching
 from orchestrator.cosim.observers.table import Table
 from orchestrator.figures.drawing import Plot, legend_columns, name_lines, styled
 from orchestrator.figures.event_marks import list_events
@@ -27,6 +26,7 @@ from orchestrator.figures.style import (
 )
 from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.texts import matches, matching
 from orchestrator.vehicle.signals import Loop
 
 #: Height of a panel, and of what stands above and below all of them [in].

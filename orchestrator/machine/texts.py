@@ -1,10 +1,14 @@
-"""Numbers, truth values and texts as files write them."""
+"""Numbers, truth values and texts as files write them, and patterns of names."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from contextlib import suppress
+from fnmatch import fnmatchcase
 from math import isfinite
+
+from orchestrator.machine.errors import InputError, did_you_mean
 
 #: Truth values, as XML writes them.
 BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
@@ -83,3 +87,24 @@ def transferable(text: str) -> str:
 def literal(value: float | bool | str) -> str:
     """A value as XML writes it."""
     return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
+    """The names that match one of some patterns such as `a.b.*`, in their own order.
+
+    Raises:
+        InputError: a pattern matches none.
+
+    """
+    for pattern in patterns:
+        if not any(matches(name, pattern) for name in names):
+            raise InputError(f"no column matches {pattern!r}{did_you_mean(pattern, names)}")
+    return [name for name in names if any(matches(name, pattern) for pattern in patterns)]
+
+
+def matches(name: str, pattern: str) -> bool:
+    """Whether a name is the pattern, belongs to the group it names, or fits its wildcards."""
+    # Brackets belong to names of arrays; they are not sets of letters here.
+    escaped = pattern.replace("[", "[[]")
+    is_member = name.startswith((f"{pattern}.", f"{pattern}["))
+    return name == pattern or is_member or fnmatchcase(name, escaped)

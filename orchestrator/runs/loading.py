@@ -12,8 +12,7 @@ from typing import Any, TypeVar
 
 from fmus.discovery import ORIGIN, origin_of
 from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
-from orchestrator.cosim.formats.osp import OSP_STRUCTURE, read_osp
-from orchestrator.cosim.formats.ssp import STRUCTURE
+from orchestrator.cosim.formats.osp import read_osp
 from orchestrator.cosim.formats.ssp.reader import read_ssp
 from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.cosim.system.names import PortName
@@ -157,7 +156,7 @@ def _loaded(
     check_brings_its_own(str(name), kind, fmi)
     system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
     whole = path.resolve()
-    named = whole.parent if path.name in (STRUCTURE, OSP_STRUCTURE) else whole
+    named = whole.parent if path.name in _STRUCTURES else whole
     return Scenario(named.stem, title=path.name or named.name), system
 
 
@@ -188,6 +187,9 @@ def read_fmu(path: Path, findings: Findings | None = None) -> System:
     )
 
 
+#: Names of descriptions in folders: of SSP, and of OSP.
+_STRUCTURES = ("SystemStructure.ssd", "OspSystemStructure.xml")
+
 #: Readers of files other than scenarios, by ending.
 _READERS: Mapping[str, Callable[..., System]] = {
     ".ssp": read_ssp,
@@ -206,7 +208,7 @@ def _reader(path: Path) -> Callable[..., System] | None:
     """The reader of a file or folder; None: it is a scenario."""
     if path.suffix in _READERS or str(path) in names() or not is_folder(path):
         return _READERS.get(path.suffix)
-    is_osp = (path / OSP_STRUCTURE).is_file() and not (path / STRUCTURE).is_file()
+    is_osp = [(path / name).is_file() for name in _STRUCTURES] == [False, True]
     return read_osp if is_osp else read_ssp
 
 

@@ -12,7 +12,7 @@ from auv_fmu.paper.euler import STEP
 from orchestrator.cosim.experiment import (
     Experiment,
 )
-from orchestrator.cosim.fmi.isolated import Isolation, isolation_of
+from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.events import Alter, Event, Events, Set
 from orchestrator.cosim.hooks.hook import Hook
 from orchestrator.cosim.hooks.timing import InputTable, Playback
@@ -170,7 +170,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
         followed = input_table.targets if input_table else ()
         events = read_events(scenario.name, scenario.events, replace(system, step=step), followed)
     findings.refuse()
-    isolation = isolation_of(request.isolate, request.step_timeout)
+    isolation = Isolation.of(request.isolate, request.step_timeout)
     stepping = choose_loop(request.loop, experiment, isolation)
     return Prepared(scenario, plan, isolation, stepping, events, input_table)
 

@@ -17,13 +17,11 @@ from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin, get_t
 
 from fmus.kinds import AUTO, KindName
 from orchestrator.cosim.experiment import (
-    ORDERS,
     CouplingName,
+    Experiment,
     Order,
-    format_order,
-    read_order,
 )
-from orchestrator.cosim.fmi.isolated import STEP_TIMEOUT
+from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.cosim.hooks.timing import RealTime
 from orchestrator.cosim.loop import LOOPS, LoopName
@@ -154,9 +152,9 @@ class Options:
         "the outputs of the last communication point), or the names of all components; default: "
         "the scenario's, else feedthrough where the outputs of the FMUs follow their inputs "
         "between steps, else gauss-seidel",
-        type=read_order,
+        type=Experiment.read_order,
         choices=None,
-        metavar=f"{'|'.join(ORDERS)}|NAME,...",
+        metavar=f"{'|'.join(Experiment.ORDERS)}|NAME,...",
     )
     coupling: CouplingName | None = option(
         None,
@@ -182,7 +180,7 @@ class Options:
         "run each FMU in a separate process, so that a crash or hang cannot take the run down",
     )
     step_timeout: float | None = option(
-        None, f"time limit for one call of an isolated FMU [s]; default: {STEP_TIMEOUT:g}"
+        None, f"time limit for one call of an isolated FMU [s]; default: {Isolation.step_timeout:g}"
     )
     strict: bool = option(False, "treat warnings as errors")
     steps: Mapping[str, float] = option(
@@ -222,7 +220,7 @@ class Request(Options):
                 continue
             words.append(flag)
             if how.get("action") != "store_true":
-                words.append(format_order(value) if name == "order" else _text(value))
+                words.append(Experiment.format_order(value) if name == "order" else _text(value))
         for name, value in self.parameters.items():
             words += ["--set", f"{name}={_text(value)}"]
         added = "; ".join(f"{name}: {text}" for name, text in rest.items() if text)

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.cosim.experiment import Experiment, format_order
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.binary import runs_python
 from orchestrator.cosim.loop import PYTHON_LOOP
 from orchestrator.cosim.observers.files import TABLE_FORMATS, TableFormat
@@ -134,9 +134,10 @@ class Result(Table):
         """One line: the scenario, and how far it came."""
         end = f", {self.failure}" if self.failure else ""
         first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
+        order = Experiment.format_order(self.header.experiment.order)
         return (
             f"<Result {self._scenario.name}: {len(self)} rows of {len(self.columns)} "
-            f"columns, {first:g} to {last:g} s, {format_order(self.header.experiment.order)}{end}>"
+            f"columns, {first:g} to {last:g} s, {order}{end}>"
         )
 
     def _repr_html_(self) -> str:

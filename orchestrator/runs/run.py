@@ -19,14 +19,7 @@ from orchestrator.cosim.hooks.checkpoint import Checkpoints
 from orchestrator.cosim.hooks.hook import Hook
 from orchestrator.cosim.hooks.timing import RealTime
 from orchestrator.cosim.observers.files import TABLE_FORMATS
-from orchestrator.cosim.observers.observer import (
-    Ending,
-    Observer,
-    Progress,
-    Selection,
-    matches,
-    matching,
-)
+from orchestrator.cosim.observers.observer import Ending, Observer, Progress, Selection
 from orchestrator.cosim.system.structure import System
 from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
@@ -35,6 +28,7 @@ from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.file_names import file_name
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
+from orchestrator.machine.texts import matches, matching
 from orchestrator.runs.folder import (
     INCOMPLETE,
     LEDGER,

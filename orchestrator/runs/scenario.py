@@ -25,7 +25,6 @@ from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.cosim.experiment import Order
 from orchestrator.cosim.hooks.events import (
-    COMPARISONS,
     Action,
     Alter,
     Condition,
@@ -39,7 +38,7 @@ from orchestrator.cosim.hooks.events import (
 from orchestrator.cosim.hooks.timing import InputTable
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped, Transformation
+from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.cosim.system.values import (
     TYPES,
     Standing,
@@ -77,7 +76,7 @@ EACH_VEHICLE = "auv*"
 #: The columns of a table of waypoints, without times and with them.
 _PLACE, _TIMED = ["x", "y", "z"], ["t", "x", "y", "z"]
 
-_CONDITION = re.compile(rf"(\S+)\s*({'|'.join(COMPARISONS)})\s*(\S+)")
+_CONDITION = re.compile(rf"(\S+)\s*({'|'.join(Condition.COMPARISONS)})\s*(\S+)")
 
 
 def vehicle_names(n: int | None) -> list[str]:
@@ -632,7 +631,7 @@ def _ports(
     return [port]
 
 
-def _routes(system: System, port: PortName) -> list[tuple[PortName, Transformation | None]]:
+def _routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Mapped) | None]]:
     """The inputs that a port feeds, with the transformation on the way; an input feeds itself."""
     if system.component(port.component).variable(port.port).causality == "input":
         return [(port, None)]
@@ -663,7 +662,7 @@ def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple
 def _altered(
     values: Mapping[str, Any],
     system: System,
-    arriving: Callable[[System, PortName, Any, Transformation | None], Value],
+    arriving: Callable[[System, PortName, Any, (Linear | Mapped) | None], Value],
 ) -> tuple[tuple[PortName, Value], ...]:
     """The inputs that some signals reach, with the values that arrive there."""
     altered = []
@@ -679,7 +678,7 @@ def _altered(
     return tuple(altered)
 
 
-def _value(system: System, port: PortName, value: Any, change: Transformation | None) -> Value:
+def _value(system: System, port: PortName, value: Any, change: (Linear | Mapped) | None) -> Value:
     """Convert the value of an overridden signal to that of an input."""
     variable = system.component(port.component).variable(port.port)
     taken = variable.typed(_text(value), str(port))
@@ -689,7 +688,7 @@ def _value(system: System, port: PortName, value: Any, change: Transformation | 
     return change(taken)
 
 
-def _offset(system: System, port: PortName, value: Any, change: Transformation | None) -> float:
+def _offset(system: System, port: PortName, value: Any, change: (Linear | Mapped) | None) -> float:
     """Convert the bias of a signal to that of an input."""
     variable = system.component(port.component).variable(port.port)
     kind = TYPES[variable.type]

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from orchestrator.cosim.experiment import COUPLINGS
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.vehicle.signals import STANDARD
 
@@ -145,7 +145,7 @@ class ScenarioFile(TomlTable):
         "`feedthrough` where the outputs of the FMUs follow their inputs between steps, else "
         "`gauss-seidel`",
     )
-    coupling: Annotated[str, OneOf(COUPLINGS)] = entry(
+    coupling: Annotated[str, OneOf(Experiment.COUPLINGS)] = entry(
         "How algebraic loops, which are rings of direct feedthroughs, are closed.",
         "`solve` where the FMUs allow it, else `delay`",
     )

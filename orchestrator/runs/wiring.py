@@ -10,11 +10,10 @@ from typing import Any
 
 from fmus.discovery import name_of
 from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.connection import Connection
+from orchestrator.cosim.system.connection import Connection, join_terminals
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.variables import BUS, COMPLETE, Terminal
-from orchestrator.machine.errors import Findings, InputError, did_you_mean, listed
+from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, for_each, vehicle_names
 
@@ -193,7 +192,7 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
         begin = components[start].terminals.get(source_group)
         if end and begin:
             try:
-                return list(_joined(components[to], end, components[start], begin))
+                return list(join_terminals(components[to], end, components[start], begin))
             except InputError as error:
                 raise InputError(f"wire {source} -> {target}: {error}") from None
     if group in inputs and not members:
@@ -221,30 +220,3 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
 def _members(ports: Iterable[str], group: str) -> list[str]:
     """The ports of a group."""
     return [name for name in ports if name.startswith((f"{group}.", f"{group}["))]
-
-
-def _joined(
-    to: Component, end: Terminal, start: Component, begin: Terminal
-) -> Iterator[Connection]:
-    """The connections of two terminals, by the rules of both: each input takes an output."""
-    for one, other in ((end, begin), (begin, end)):
-        if one.rule not in (*COMPLETE, BUS):
-            raise InputError(f"the matching rule {one.rule!r} of a terminal is not supported")
-        if one.flows:
-            raise InputError(f"{listed(one.flows)} of a terminal: only signals are supported")
-        missing = [member for member in one.members if member not in other.members]
-        if one.rule in COMPLETE and missing:
-            raise InputError(f"a terminal lacks the member {listed(missing)}")
-    for member in (member for member in end.members if member in begin.members):
-        targets, sources = to.elements(end.members[member]), start.elements(begin.members[member])
-        if len(targets) != len(sources):
-            raise InputError(f"{member} has {len(sources)} elements here and {len(targets)} there")
-        for target, source in zip(targets, sources, strict=True):
-            there, here = PortName(start.name, source.name), PortName(to.name, target.name)
-            match source.causality, target.causality:
-                case "output", "input":
-                    yield Connection(there, here)
-                case "input", "output":
-                    yield Connection(here, there)
-                case first, second:
-                    raise InputError(f"{there} has causality {first}, {here} of {second}")

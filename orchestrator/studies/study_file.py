@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.cosim.experiment import ORDERS
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.figures.study_values import (
@@ -183,7 +183,7 @@ class StudyFile(TomlTable):
         "the scenario's",
     )
     step: float = entry("Communication step [s].", "the scenario's")
-    order: Annotated[str, OneOf(ORDERS)] = entry("Order of the steps.", "the scenario's")
+    order: Annotated[str, OneOf(Experiment.ORDERS)] = entry("Order of the steps.", "the scenario's")
     parameters: dict[str, Any] = entry(
         "Parameters of all runs, as in a scenario.", "the scenario's"
     )

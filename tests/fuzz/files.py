@@ -38,7 +38,7 @@ import numpy as np
 
 from orchestrator import Result, simulate
 from orchestrator.commands.main import main as auv_fmu
-from orchestrator.cosim.experiment import ORDERS
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.formats.ssp.writer import ssp_bytes
 from orchestrator.cosim.observers.files import CsvFile
 from orchestrator.cosim.observers.observer import Observer
@@ -110,7 +110,7 @@ def kinds(runs: Mapping[str, Result]) -> dict[str, Kind]:
             Path(folder, name).write_bytes(content)
         system = closed_loop(Path(folder), read_scenario("fig5"))
         archive = ssp_bytes(replace(system, stop_time=0.1, step=0.02))
-        saved = runs[ORDERS[0]].save(Path(folder, "saved"))
+        saved = runs[Experiment.ORDERS[0]].save(Path(folder, "saved"))
         stored = {path.name: path.read_bytes() for path in saved.iterdir()}
         table = Path(folder, "table.csv")
         file = CsvFile(table)
@@ -235,7 +235,7 @@ def _table(runs: Mapping[str, Result], valid: bytes) -> Kind:
     }
 
     def check(content: bytes, said: str) -> str:
-        [order] = [order for order in ORDERS if f"in {order} order" in said]
+        [order] = [order for order in Experiment.ORDERS if f"in {order} order" in said]
         found = agreement(content, columns[order], booleans, TOLERANCE)
         if found is None:
             return "certified, and does not agree"
@@ -359,7 +359,10 @@ def prepared() -> Iterator[dict[str, Kind]]:
         _forget()
         _process_folder.cache_clear()
         try:
-            runs = {order: simulate("fig4", stop_time=RECORDED, order=order) for order in ORDERS}
+            runs = {
+                order: simulate("fig4", stop_time=RECORDED, order=order)
+                for order in Experiment.ORDERS
+            }
             with patch.object(verify, "simulate_to_end", partial(_replay, runs)):
                 found = kinds(runs)
                 for name, kind in found.items():

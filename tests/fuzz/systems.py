@@ -52,7 +52,7 @@ from fuzz.components import (
     function,
     names_of,
 )
-from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import Plan, make_plan
 from orchestrator.cosim.simulation import simulate_plan
@@ -61,7 +61,7 @@ from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection, can_feed
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped, Transformation
+from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.live import module
 from orchestrator.live.module import MODULE
 from orchestrator.live.programs import OF_PROGRAM, Source
@@ -353,7 +353,7 @@ def drawn(seed: int, made: Sequence[Made]) -> Drawn:
     )
     start = draw.choice((0.0, 0.0, 1.5, -2.3, 1e3))
     length = step * (draw.randint(8, 30) + draw.choice((0.0, 0.0, 0.4, draw.random())))
-    order = draw.choice((None, *ORDERS, tuple(draw.sample(names, len(names)))))
+    order = draw.choice((None, *Experiment.ORDERS, tuple(draw.sample(names, len(names)))))
     experiment = Experiment(start + length, step, order, start)
     return Drawn(parts, system, experiment, draw.random() < 0.3)
 
@@ -386,7 +386,7 @@ def _wired(system: System, draw: Random) -> System:
     return system
 
 
-def _change(source: Any, target: Any, draw: Random) -> Transformation | None:
+def _change(source: Any, target: Any, draw: Random) -> (Linear | Mapped) | None:
     kinds = source.family, target.family
     if draw.random() < 0.5:
         return None

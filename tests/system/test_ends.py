@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.cosim.experiment import ORDERS
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName
@@ -41,7 +41,7 @@ def ring(folder, ends, steps=()):
 
 
 @EVERY_WAY
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", Experiment.ORDERS)
 @pytest.mark.parametrize("who", ["b", *slow("a", "c")])
 @pytest.mark.parametrize(("at", "rows"), [(0.5, 5), (0.45, 5), (0.02, 1)])
 def test_the_rows_are_those_of_the_steps_before_the_one_in_which_an_fmu_ends(

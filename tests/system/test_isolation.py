@@ -20,7 +20,7 @@ import pytest
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.loop import LOOPS, choose_loop
 from orchestrator.cosim.observers.observer import Header
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
@@ -31,7 +31,7 @@ from orchestrator.machine.errors import InputError, StartError
 from orchestrator.runs.tables import read_rows
 from orchestrator.runs.wiring import closed_loop
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
-from support.machine import LOOPS, contents, start
+from support.machine import contents, start
 from support.runs import run_table, whole
 from support.texts import mentions
 from support.tiers import slow

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import auv_fmu
 import fmus
 from fmus.ports.port import Port
-from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.runs.scenario import names, read_scenario
 from support.instances import component
 from support.kinds import Outcome, difference, outcome
@@ -61,7 +61,7 @@ def test_scenario_is_the_same(dist: Path, native: Path, scenario: str):
     both(dist, native, scenario, Experiment(10.0, STEP))
 
 
-@pytest.mark.parametrize("order", [ORDERS[0], *slow(*ORDERS[1:])])
+@pytest.mark.parametrize("order", [Experiment.ORDERS[0], *slow(*Experiment.ORDERS[1:])])
 @pytest.mark.parametrize("scenario", ["fig4", *slow("fig5-pd", "formation-v")])
 def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str, order: str):
     stop_time = read_scenario(scenario).stop_time
@@ -69,7 +69,7 @@ def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str
     both(dist, native, scenario, Experiment(stop_time, STEP, order))
 
 
-@pytest.mark.parametrize("order", [ORDERS[0], *slow(*ORDERS[1:])])
+@pytest.mark.parametrize("order", [Experiment.ORDERS[0], *slow(*Experiment.ORDERS[1:])])
 @pytest.mark.parametrize(
     ("scenario", "values"),
     [

@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.instance import Ended
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.events import Alter, Event, Events
 from orchestrator.cosim.hooks.hook import NEVER, Run
-from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.loop import LOOPS, choose_loop
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
@@ -31,7 +31,6 @@ from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import StartError
 from orchestrator.runs.loading import load
 from orchestrator.runs.wiring import closed_loop
-from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
 from support.runs import run_table
 from support.texts import mentions
@@ -170,7 +169,7 @@ FED = {
 
 
 @pytest.mark.parametrize("way", HERE, ids=LOOPS)
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", Experiment.ORDERS)
 @pytest.mark.parametrize(
     ("factor", "target", "bias", "words"),
     [
@@ -205,7 +204,7 @@ def test_an_input_that_its_type_cannot_hold_ends_the_run(
 
 
 @pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", Experiment.ORDERS)
 @pytest.mark.parametrize("act", ["ROUNDS", "FLUSHES"])
 def test_the_mode_of_an_fmu_changes_no_number_of_the_others(folder, loop, order, act):
     """It takes it on when its outputs are asked for, which it only copies."""
@@ -308,7 +307,7 @@ class Pushes:
 
 
 @pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", Experiment.ORDERS)
 def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
     pushes = Pushes(10, 620, 650)
     table = run_table(load("fig4", NATIVE), Experiment(14.0, 0.02, order), loop, hooks=[pushes])

@@ -20,7 +20,7 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.binary import check_place
 from orchestrator.cosim.formats.ssp.reader import read_ssp
 from orchestrator.cosim.formats.ssp.writer import ssp_bytes
-from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.loop import LOOPS, choose_loop
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
@@ -32,7 +32,6 @@ from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
 from orchestrator.runs.tables import read_columns, read_rows
-from support.machine import LOOPS
 from support.runs import run, write
 from support.texts import mentions
 from support.tiers import slow

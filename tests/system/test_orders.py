@@ -12,7 +12,7 @@ import pytest
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.plan import make_plan
@@ -97,7 +97,7 @@ def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
     assert (table.rows.tobytes() == derived.rows.tobytes()) == same
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", Experiment.ORDERS)
 def test_equal_steps_of_all_components_are_one_step(order):
     system, experiment = load("fig4", NATIVE), Experiment(4.0, 0.02, order)
     whole = run(system, experiment)

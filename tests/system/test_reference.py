@@ -13,7 +13,7 @@ from fmpy.util import read_csv, read_ref_opt_file, write_csv
 
 from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import INITIAL, ORDERS, OrderName
+from orchestrator.cosim.experiment import INITIAL, Experiment, OrderName
 from orchestrator.cosim.system.component import read_component
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
@@ -50,7 +50,7 @@ def test_a_fresh_run_of_the_system_is_the_reference(system: System):
     assert "to 4 s, in jacobi order" in verify(COMMITTED / "auv_ref.csv", system, 1e-9)
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", Experiment.ORDERS)
 def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path, order: OrderName):
     path = tmp_path / "ours.csv"
     write(run(system, 2.0, 0.02, order), path)

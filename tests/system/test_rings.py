@@ -11,7 +11,7 @@ import fmpy
 import numpy as np
 import pytest
 
-from orchestrator.cosim.experiment import ORDERS, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.instance import ComponentFailed
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks.checkpoint import Checkpoints
@@ -48,7 +48,7 @@ def ring(folder, k: float, l: float, names: str = "sab", **kind: object) -> Syst
 
 
 @pytest.mark.parametrize(("k", "l"), [(0.5, 0.9), (0.9, -0.9), (1.0, -2.0), (2.0, 3.0)])
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", Experiment.ORDERS)
 @pytest.mark.parametrize("can", [True, False])
 def test_static_rings_are_solved_in_every_row_whatever_their_gain(folder, k, l, order, can):
     """By directional derivatives, and by differences."""

@@ -110,28 +110,28 @@ class Isolation:
 
     step_timeout: float = STEP_TIMEOUT
 
+    @classmethod
+    def of(cls, isolate: bool, step_timeout: float | None) -> Isolation | None:
+        """Make the settings of a user's two options.
+
+        Raises:
+            InputError: a timeout without isolation: a call in this process cannot be ended.
+
+        """
+        if isolate:
+            return cls() if step_timeout is None else cls(step_timeout)
+        if step_timeout is not None:
+            raise InputError(
+                "--step-timeout needs --isolate: only an FMU in a separate process can be ended"
+            )
+        return None
+
     def __post_init__(self) -> None:
         """Refuse a limit that is no positive number."""
         seconds = self.step_timeout
         number = isinstance(seconds, Real) and not isinstance(seconds, bool)
         if not (number and isfinite(seconds) and seconds > 0.0):
             raise InputError(f"step timeout {seconds!r}: must be a positive number of seconds")
-
-
-def isolation_of(isolate: bool, step_timeout: float | None) -> Isolation | None:
-    """Make the settings of a user's two options.
-
-    Raises:
-        InputError: a timeout without isolation: a call in this process cannot be ended.
-
-    """
-    if isolate:
-        return Isolation() if step_timeout is None else Isolation(step_timeout)
-    if step_timeout is not None:
-        raise InputError(
-            "--step-timeout needs --isolate: only an FMU in a separate process can be ended"
-        )
-    return None
 
 
 @contextmanager

@@ -13,7 +13,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 from orchestrator.cosim.fmi.instance import ComponentFailed, Ended
 from orchestrator.cosim.hooks.hook import NEVER, Run
@@ -38,6 +38,8 @@ MOST_LISTED = 1000
 @dataclass(frozen=True)
 class Condition:
     """A signal, as the row shows it, compared with a number."""
+
+    COMPARISONS: ClassVar = COMPARISONS
 
     signal: PortName
     comparison: str

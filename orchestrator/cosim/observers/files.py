@@ -6,7 +6,6 @@ import csv
 import os
 from collections.abc import Sequence
 from importlib import import_module
-from importlib.util import find_spec
 from io import BufferedWriter, RawIOBase, StringIO
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -14,27 +13,12 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.machine.errors import InputError
 from orchestrator.machine.operating_system import is_still
-
-#: Rows that are read at once, and that are written to Parquet at once.
-ROWS_AT_ONCE = 8192
+from orchestrator.machine.parquet import ROWS_AT_ONCE, parquet
 
 #: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
 #: are written at once.
 _BYTES, _CHUNK_BYTES = 9, 1024
-
-
-def parquet() -> Any:
-    """Return the module that reads and writes Parquet.
-
-    Raises:
-        InputError: it is not installed.
-
-    """
-    if find_spec("pyarrow") is None:
-        raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
-    return import_module("pyarrow.parquet")
 
 
 class _Output(RawIOBase):

@@ -10,7 +10,6 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from ctypes import Structure, c_size_t, c_void_p
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from functools import cached_property
 from time import monotonic
 from typing import Any, NamedTuple, Protocol
@@ -20,7 +19,7 @@ import numpy as np
 from orchestrator.cosim.experiment import ROUNDING, Experiment
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.values import Standing, as_float32
-from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
+from orchestrator.machine.errors import InputError, unforeseen
 from orchestrator.machine.progress import progress_bar
 
 #: Rows in a block, and the longest time until observers are told of them [s].
@@ -308,27 +307,6 @@ class Selection:
         if len(self._last):
             self._observer.take(self._last)
         self._observer.end(ending)
-
-
-def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
-    """The names that match one of some patterns such as `a.b.*`, in their own order.
-
-    Raises:
-        InputError: a pattern matches none.
-
-    """
-    for pattern in patterns:
-        if not any(matches(name, pattern) for name in names):
-            raise InputError(f"no column matches {pattern!r}{did_you_mean(pattern, names)}")
-    return [name for name in names if any(matches(name, pattern) for pattern in patterns)]
-
-
-def matches(name: str, pattern: str) -> bool:
-    """Whether a name is the pattern, belongs to the group it names, or fits its wildcards."""
-    # Brackets belong to names of arrays; they are not sets of letters here.
-    escaped = pattern.replace("[", "[[]")
-    is_member = name.startswith((f"{pattern}.", f"{pattern}["))
-    return name == pattern or is_member or fnmatchcase(name, escaped)
 
 
 class Progress:

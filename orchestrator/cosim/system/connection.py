@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import isfinite
 
@@ -12,8 +12,8 @@ from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.units import Linear, Mapped, Transformation, conversion, unit_of_port
 from orchestrator.cosim.system.values import TYPES
-from orchestrator.cosim.system.variables import Variable
-from orchestrator.machine.errors import InputError
+from orchestrator.cosim.system.variables import BUS, COMPLETE, Terminal, Variable
+from orchestrator.machine.errors import InputError, listed
 
 #: What can be fed from another family of types, besides from its own.
 _FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
@@ -104,3 +104,30 @@ def _check_transformed(connection: Connection, fmi_type: str) -> None:
                     raise InputError(
                         f"{wire}: is mapped to {shown}, which FMI type {fmi_type} cannot hold"
                     )
+
+
+def join_terminals(
+    to: Component, end: Terminal, start: Component, begin: Terminal
+) -> Iterator[Connection]:
+    """The connections of two terminals, by the rules of both: each input takes an output."""
+    for one, other in ((end, begin), (begin, end)):
+        if one.rule not in (*COMPLETE, BUS):
+            raise InputError(f"the matching rule {one.rule!r} of a terminal is not supported")
+        if one.flows:
+            raise InputError(f"{listed(one.flows)} of a terminal: only signals are supported")
+        missing = [member for member in one.members if member not in other.members]
+        if one.rule in COMPLETE and missing:
+            raise InputError(f"a terminal lacks the member {listed(missing)}")
+    for member in (member for member in end.members if member in begin.members):
+        targets, sources = to.elements(end.members[member]), start.elements(begin.members[member])
+        if len(targets) != len(sources):
+            raise InputError(f"{member} has {len(sources)} elements here and {len(targets)} there")
+        for target, source in zip(targets, sources, strict=True):
+            there, here = PortName(start.name, source.name), PortName(to.name, target.name)
+            match source.causality, target.causality:
+                case "output", "input":
+                    yield Connection(there, here)
+                case "input", "output":
+                    yield Connection(here, there)
+                case first, second:
+                    raise InputError(f"{there} has causality {first}, {here} of {second}")

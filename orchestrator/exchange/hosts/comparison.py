@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.experiment import Experiment, read_order
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.observers.table import Table
 from orchestrator.cosim.system.structure import System
 from orchestrator.exchange.hosts import drivers, here
@@ -168,7 +168,7 @@ def compare(
 
     @cache
     def expected(order: str, initial: str, turned: bool) -> tuple[Experiment, np.ndarray]:
-        way, table = next(ways(system, read_order(order), initial)), Table()
+        way, table = next(ways(system, Experiment.read_order(order), initial)), Table()
         (way.turn() if turned else way).run(system, asked, table)
         return replace(asked, order=way.order), table.group(*names)[1:]
 

@@ -11,16 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.observer import (
-    Ending,
-    Header,
-    Progress,
-    Selection,
-    matches,
-    matching,
-)
+from orchestrator.cosim.observers.observer import Ending, Header, Progress, Selection
 from orchestrator.cosim.observers.table import Table
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.texts import matches, matching
 
 COLUMNS = ("a.x", "a.y", "b.k[1]", "b.k[2]")
 CUTS = st.lists(st.integers(1, 999), max_size=5)

@@ -22,7 +22,7 @@ from orchestrator.cosim.system.component import Component, read_component
 from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped, Transformation
+from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.machine.errors import Findings
 from support.archives import archive, fmu, fmu3, variable
 
@@ -54,7 +54,7 @@ def system_of(
     parts: dict[str, Component],
     kinds: dict[str, str],
     wires: dict[str, str],
-    made: dict[str, Transformation] | None = None,
+    made: dict[str, (Linear | Mapped)] | None = None,
     **others: object,
 ) -> System:
     """A system of components by the kinds of their FMUs, and targets by their sources.
@@ -229,7 +229,7 @@ def test_arrays_cross_borders_as_a_whole(parts: dict[str, Component]):
 
 def test_what_happens_to_a_value_on_its_way_is_read_as_it_was(parts: dict[str, Component]):
     """In the unit of the output, also where two FMUs call different lengths a metre."""
-    made: dict[str, Transformation] = {
+    made: dict[str, (Linear | Mapped)] = {
         "b.c.p:v": Linear(0.001, 2.0), "b.c.p:n": Mapped(((1.0, 2.0),)), "a.q:u.x": Linear(),
         "b.p:u.x": Linear(0.3048),
     }  # fmt: skip
@@ -347,7 +347,7 @@ def nested_systems(draw: st.DrawFn, parts: dict[str, Component]) -> System:
     }
     sources = [(f"{name}:{port}", *of) for name in names for port, *of in outputs[kinds[name]]]
     wires: dict[str, str] = {}
-    made: dict[str, Transformation] = {}
+    made: dict[str, (Linear | Mapped)] = {}
     for name in names:
         for port, kind, unit in inputs[kinds[name]]:
             fitting = [one for one in sources if one[1] == kind]
