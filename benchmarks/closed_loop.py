@@ -30,12 +30,10 @@ from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
 from fmus.python.component import Component
 from fmus.python.state import STEPPING
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import Experiment, Stepping, System, choose_loop
 from orchestrator.cosim.fmi.instance import Instance
 from orchestrator.cosim.fmi.slaves import FMU2OfOthers
-from orchestrator.cosim.loop import Stepping, choose_loop
 from orchestrator.cosim.stages import Member
-from orchestrator.cosim.system.structure import System
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
 

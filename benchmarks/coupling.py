@@ -17,12 +17,8 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.loop import choose_loop, compile_stepper
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Experiment, System, Table, choose_loop, make_plan, simulate_plan
+from orchestrator.cosim.loop import compile_stepper
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 

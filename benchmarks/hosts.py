@@ -25,14 +25,16 @@ import fmpy
 import measuring
 
 from fmus.kinds import NATIVE
-from orchestrator.cosim.formats.osp import write_osp
-from orchestrator.cosim.formats.ssp.reader import read_ssp
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.loop import choose_loop
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    System,
+    Table,
+    choose_loop,
+    read_component,
+    read_ssp,
+    simulate_plan,
+    write_osp,
+    write_ssp,
+)
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.bundle import build_bundle
 from orchestrator.runs.preparation import prepare

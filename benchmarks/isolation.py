@@ -14,12 +14,7 @@ from measuring import options, python, steps_time, timed
 
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Experiment, Isolation, System, Table, make_plan, simulate_plan
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop
 

@@ -22,14 +22,20 @@ from measuring import python, resident
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import KINDS, NATIVE
 from orchestrator import load
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.hooks.checkpoint import Checkpoints
-from orchestrator.cosim.hooks.hook import NEVER, Hook, Run
-from orchestrator.cosim.loop import LOOPS, choose_loop
+from orchestrator.cosim import (
+    LOOPS,
+    Checkpoints,
+    Experiment,
+    Hook,
+    Observer,
+    Run,
+    Selection,
+    choose_loop,
+    make_plan,
+    simulate_plan,
+)
+from orchestrator.cosim.hooks.hook import NEVER
 from orchestrator.cosim.observers.files import CsvFile
-from orchestrator.cosim.observers.observer import Observer, Selection
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile

@@ -15,13 +15,17 @@ from time import perf_counter
 from typing import Any
 
 from auv_fmu.paper.euler import STEP
-from orchestrator.cosim.experiment import Experiment, Order
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.loop import PYTHON_LOOP, Stepping
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    PYTHON_LOOP,
+    Experiment,
+    Isolation,
+    Order,
+    Stepping,
+    System,
+    Table,
+    make_plan,
+    simulate_plan,
+)
 
 #: The first argument of a script where it makes one run, in a process of its own.
 ONE = "--one"

@@ -26,14 +26,17 @@ from zipfile import ZipFile
 
 import measuring
 
-from orchestrator.cosim.formats.osp import write_osp
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    Connection,
+    Ending,
+    Header,
+    PortName,
+    System,
+    Table,
+    read_component,
+    write_osp,
+    write_ssp,
+)
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request

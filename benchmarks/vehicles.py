@@ -25,8 +25,7 @@ import numpy as np
 
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import NATIVE, PYTHON, KindName
-from orchestrator.cosim.loop import LoopName
-from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim import Ending, Header, LoopName
 from orchestrator.exchange.hosts.comparison import compare
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare

@@ -45,9 +45,7 @@ from auv_fmu.remus.hull import inertia
 from auv_fmu.remus.remus100 import Parameters, RemusState, accelerations, tail_forces
 from fmus.ports.port import H_MAX
 from orchestrator import simulate
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import PortName, System, Table
 from orchestrator.paper.claims import total_variation_until
 from orchestrator.paper.page import numbers, table
 from orchestrator.program.components import definitions_of

@@ -19,8 +19,7 @@ from auv_fmu.paper.disturbance import Disturbance
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.motion_planner import TAU_D
 from auv_fmu.paper.vehicle import Vehicle
-from orchestrator.cosim.experiment import OrderName
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import OrderName, Table
 from orchestrator.machine.workers import Workers, workers
 from orchestrator.paper.claims import (
     EFFORT_PD,

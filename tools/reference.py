@@ -30,13 +30,16 @@ from fmpy.util import write_csv
 from fmus.discovery import REFERENCE, RELATED_MANIFEST, components
 from fmus.kinds import PYTHON
 from fmus.ports.port import FAULT
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import (
+    Component,
+    Experiment,
+    Value,
+    make_plan,
+    read_component,
+    simulate_to_end,
+)
 from orchestrator.cosim.formats.ssp.writer import parameter_set_xml
 from orchestrator.cosim.observers.files import CsvFile
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_to_end
-from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.values import Value
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.own_components import build_own

@@ -19,7 +19,7 @@ from zipfile import ZipFile
 import numpy as np
 
 from orchestrator import load
-from orchestrator.cosim.formats.osp import write_osp
+from orchestrator.cosim import write_osp
 
 #: Where the name of a parameter set stands.
 _PARAMETER_SET = re.compile(r"ParameterSet\b[^>]*\bname=\"([^\"]*)\"")

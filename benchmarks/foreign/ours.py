@@ -15,10 +15,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator import Result, load, simulate
-from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
-from orchestrator.cosim.system.variables import Variable
+from orchestrator.cosim import Component, System, Value, Variable, read_component
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import DEFAULT_STEP
 

@@ -12,8 +12,7 @@ from fmpy.validation import validate_fmu
 
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
-from orchestrator.cosim.fmi.binary import binary_of, check_binary
-from orchestrator.cosim.system.component import Component, read_component
+from orchestrator.cosim import Component, binary_of, check_binary, read_component
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack

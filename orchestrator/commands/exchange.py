@@ -21,12 +21,7 @@ from orchestrator.commands.options import (
     read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, describe, say, show
-from orchestrator.cosim.experiment import (
-    INITIAL,
-    Experiment,
-)
-from orchestrator.cosim.formats.osp import write_osp
-from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim import INITIAL, Experiment, write_osp, write_ssp
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.hosts.here import fmi_of
@@ -168,7 +163,8 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
         type=Experiment.read_order,
         metavar=f"{'|'.join(Experiment.ORDERS)}|NAME,...",
         help="order in which the tool steps the components: "
-        f"{', '.join(Experiment.ORDERS)}, or the names of all components, joined by + where they are stepped side by side; default: whichever of "
+        f"{', '.join(Experiment.ORDERS)}, or the names of all components, joined by + where they "
+        "are stepped side by side; default: whichever of "
         f"{', '.join(Experiment.ORDERS)} matches better",
     )
     parser.add_argument(

@@ -17,7 +17,7 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import OK, describe, say, show
-from orchestrator.cosim.observers.observer import Observer, Progress
+from orchestrator.cosim import Observer, Progress
 from orchestrator.figures.drawing import save
 from orchestrator.figures.film import Film, animate
 from orchestrator.figures.plot import plot, told_apart, wanted_columns

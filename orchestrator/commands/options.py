@@ -9,8 +9,7 @@ from typing import Any, TypeVar
 
 from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.commands.streams import FAILED, OK, say
-from orchestrator.cosim.observers.observer import Ending
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Ending, System
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.request import Request, flags

@@ -1,4 +1,15 @@
-"""How a system is stepped: `simulation` runs the loop, observers take its rows.
+"""A co-simulation master for any FMUs, and for systems of SSP and OSP.
+
+    from pathlib import Path
+    from orchestrator.cosim import Experiment, Table, make_plan, read_ssp, simulate_plan
+
+    table = Table()
+    plan = make_plan(read_ssp(Path("system.ssp")), Experiment(stop_time=10.0, step=0.01))
+    ending = simulate_plan(plan, [table])
+    print(ending.failure or table["gain.y"][-1])
+
+It knows no component, and imports `orchestrator.machine` and nothing else of this product. What it
+offers is named here, imported on first use; the modules in it are private.
 
 The loop, in :func:`.simulation.simulate_plan`::
 
@@ -11,6 +22,186 @@ The loop, in :func:`.simulation.simulate_plan`::
             step each of them, then read their outputs
         tell the observers the row
         stop if an FMU has failed, or a signal says so
-
-Nothing here knows which components there are.
 """
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from orchestrator.cosim.experiment import (
+        INITIAL,
+        CouplingName,
+        Exchange,
+        Experiment,
+        Order,
+        OrderName,
+    )
+    from orchestrator.cosim.fmi.binary import binary_of, check_binary, runs_python
+    from orchestrator.cosim.fmi.isolated import Isolation
+    from orchestrator.cosim.formats.osp import read_osp, write_osp
+    from orchestrator.cosim.formats.ssp.archive import read_document
+    from orchestrator.cosim.formats.ssp.reader import bind_parameter_set, read_ssp
+    from orchestrator.cosim.formats.ssp.writer import PARAMETER_SET, ssp_bytes, write_ssp
+    from orchestrator.cosim.hooks.checkpoint import Checkpoints
+    from orchestrator.cosim.hooks.events import (
+        Action,
+        Alter,
+        Condition,
+        Event,
+        Events,
+        Freeze,
+        Release,
+        Reset,
+        Set,
+        Stop,
+    )
+    from orchestrator.cosim.hooks.hook import Hook, Run
+    from orchestrator.cosim.hooks.timing import InputTable, Playback, RealTime
+    from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, LoopName, Stepping, choose_loop
+    from orchestrator.cosim.observers.files import TABLE_FORMATS, CsvLines, TableFormat
+    from orchestrator.cosim.observers.observer import (
+        Ending,
+        Header,
+        Observer,
+        Occurrence,
+        Progress,
+        Selection,
+        every,
+    )
+    from orchestrator.cosim.observers.table import Table
+    from orchestrator.cosim.plan import Plan, make_plan
+    from orchestrator.cosim.row import FACTOR, OFFSET
+    from orchestrator.cosim.simulation import simulate_plan, simulate_to_end
+    from orchestrator.cosim.stages import Stage, Stages, Visit, stages_of, types_read
+    from orchestrator.cosim.system.component import Component, read_component
+    from orchestrator.cosim.system.connection import Connection, join_terminals
+    from orchestrator.cosim.system.names import PortName
+    from orchestrator.cosim.system.structure import System
+    from orchestrator.cosim.system.units import Linear, Mapped
+    from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value
+    from orchestrator.cosim.system.variables import Variable
+
+__all__ = [
+    "FACTOR",
+    "INITIAL",
+    "LOOPS",
+    "OFFSET",
+    "PARAMETER_SET",
+    "PYTHON_LOOP",
+    "TABLE_FORMATS",
+    "TYPES",
+    "Action",
+    "Alter",
+    "Checkpoints",
+    "Component",
+    "Condition",
+    "Connection",
+    "CouplingName",
+    "CsvLines",
+    "Ending",
+    "Event",
+    "Events",
+    "Exchange",
+    "Experiment",
+    "Freeze",
+    "Header",
+    "Hook",
+    "InputTable",
+    "Isolation",
+    "Linear",
+    "LoopName",
+    "Mapped",
+    "Observer",
+    "Occurrence",
+    "Order",
+    "OrderName",
+    "Plan",
+    "Playback",
+    "PortName",
+    "Progress",
+    "RealTime",
+    "Release",
+    "Reset",
+    "Run",
+    "Selection",
+    "Set",
+    "Stage",
+    "Stages",
+    "Standing",
+    "Stepping",
+    "Stop",
+    "StringTable",
+    "System",
+    "Table",
+    "TableFormat",
+    "Value",
+    "Variable",
+    "Visit",
+    "binary_of",
+    "bind_parameter_set",
+    "check_binary",
+    "choose_loop",
+    "every",
+    "join_terminals",
+    "make_plan",
+    "read_component",
+    "read_document",
+    "read_osp",
+    "read_ssp",
+    "runs_python",
+    "simulate_plan",
+    "simulate_to_end",
+    "ssp_bytes",
+    "stages_of",
+    "types_read",
+    "write_osp",
+    "write_ssp",
+]
+
+#: Where each name is, by modules.
+_PLACES = {
+    "experiment": "CouplingName Exchange Experiment INITIAL Order OrderName",
+    "fmi.binary": "binary_of check_binary runs_python",
+    "fmi.isolated": "Isolation",
+    "formats.osp": "read_osp write_osp",
+    "formats.ssp.archive": "read_document",
+    "formats.ssp.reader": "bind_parameter_set read_ssp",
+    "formats.ssp.writer": "PARAMETER_SET ssp_bytes write_ssp",
+    "hooks.checkpoint": "Checkpoints",
+    "hooks.events": "Action Alter Condition Event Events Freeze Release Reset Set Stop",
+    "hooks.hook": "Hook Run",
+    "hooks.timing": "InputTable Playback RealTime",
+    "loop": "LOOPS LoopName PYTHON_LOOP Stepping choose_loop",
+    "observers.files": "CsvLines TABLE_FORMATS TableFormat",
+    "observers.observer": "Ending Header Observer Occurrence Progress Selection every",
+    "observers.table": "Table",
+    "plan": "Plan make_plan",
+    "row": "FACTOR OFFSET",
+    "simulation": "simulate_plan simulate_to_end",
+    "stages": "Stage Stages Visit stages_of types_read",
+    "system.component": "Component read_component",
+    "system.connection": "Connection join_terminals",
+    "system.names": "PortName",
+    "system.structure": "System",
+    "system.units": "Linear Mapped",
+    "system.values": "Standing StringTable TYPES Value",
+    "system.variables": "Variable",
+}
+_MODULES = {name: module for module, names in _PLACES.items() for name in names.split()}
+
+
+def __dir__() -> list[str]:
+    """List what is offered, imported or not."""
+    return sorted({*globals(), *__all__})
+
+
+def __getattr__(name: str) -> object:
+    """Import what is asked for."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module  # noqa: PLC0415
+
+    found = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
+    globals()[name] = found
+    return found

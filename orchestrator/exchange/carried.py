@@ -17,16 +17,18 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from fmus.discovery import RELATED, RELATED_MANIFEST
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.formats.ssp.archive import read_document
-from orchestrator.cosim.formats.ssp.reader import bind_parameter_set
-from orchestrator.cosim.hooks.hook import Hook
-from orchestrator.cosim.hooks.timing import Playback
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_to_end
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    Experiment,
+    Hook,
+    Playback,
+    PortName,
+    System,
+    Table,
+    bind_parameter_set,
+    make_plan,
+    read_document,
+    simulate_to_end,
+)
 from orchestrator.exchange.series import Series, comparison, read_series
 from orchestrator.exchange.verify import TOLERANCE, check_tolerance, enumerated
 from orchestrator.machine.errors import Findings, InputError, listed

@@ -8,11 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.values import Value
-from orchestrator.cosim.system.variables import Variable
+from orchestrator.cosim import Component, Experiment, Table, Value, Variable
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.tables import places_of_time, port_of, records, time_of
 

@@ -12,18 +12,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.cosim.experiment import (
+from orchestrator.cosim import (
+    Ending,
+    Event,
+    Events,
     Exchange,
     Experiment,
+    Header,
+    Hook,
+    Observer,
     Order,
+    PortName,
+    Run,
+    System,
+    make_plan,
+    simulate_to_end,
 )
-from orchestrator.cosim.hooks.events import Event, Events
-from orchestrator.cosim.hooks.hook import Hook, Run
-from orchestrator.cosim.observers.observer import Ending, Header, Observer
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_to_end
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.texts import BOOLEANS, finite
 from orchestrator.runs.preparation import DEFAULT_STEP

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from auv_fmu.language.quantities import TAU
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.figures.event_marks import mark_events
 from orchestrator.figures.style import (
     COLOURS,

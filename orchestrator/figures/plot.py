@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.figures.drawing import Plot, legend_columns, name_lines, styled
 from orchestrator.figures.event_marks import list_events
 from orchestrator.figures.panels import over_time

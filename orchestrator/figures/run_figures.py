@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from auv_fmu.language.quantities import NU, THETA
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.figures import fleet_panels
 from orchestrator.figures.panels import (
     COMMANDS,

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import cycle
 from typing import Any, NamedTuple
 
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 
 #: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Ending, Header, Table
 from orchestrator.vehicle.signals import STANDARD
 
 if TYPE_CHECKING:

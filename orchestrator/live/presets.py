@@ -15,20 +15,20 @@ from operator import itemgetter
 from typing import Any, NamedTuple
 
 from fmus.kinds import NATIVE
-from orchestrator.cosim.hooks.events import (
+from orchestrator.cosim import (
     Action,
     Alter,
+    Component,
     Event,
     Freeze,
+    PortName,
     Release,
     Reset,
     Set,
     Stop,
+    System,
+    Value,
 )
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.live.assembly import Plain, assemble, vehicle_data
 from orchestrator.live.module import LICENCES, MODULE, live_module

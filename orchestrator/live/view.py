@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.figures.style import Drawn, printed_unit, reference_colours, vehicle_colours
 from orchestrator.live.assembly import Plain, assemble, vehicle_data
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE

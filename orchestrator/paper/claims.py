@@ -18,7 +18,7 @@ from auv_fmu.paper.output_feedback import Gains
 from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import theorem
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.page import actuator_values, numbers
 from orchestrator.runs.request import Request

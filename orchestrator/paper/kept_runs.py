@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from fmus.kinds import AUTO, KindName
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import digest_of

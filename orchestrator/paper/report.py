@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import AUTO, KindName
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import PortName
 from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit

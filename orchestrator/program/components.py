@@ -18,8 +18,7 @@ from fmus.native.translator import translated
 from fmus.ports.definition import Definition, define
 from fmus.ports.port import Misdeclared
 from fmus.script import is_component
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Component, System
 from orchestrator.machine.disk import sha256_of
 from orchestrator.machine.errors import InputError, reason, shortened
 from orchestrator.runs.bundle import current_fmus

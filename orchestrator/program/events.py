@@ -13,10 +13,7 @@ from typing import Protocol
 from fmus.language.types import FLOAT
 from fmus.native.emit import number_in_c
 from fmus.native.pieces import Place
-from orchestrator.cosim.plan import Plan
-from orchestrator.cosim.row import FACTOR, OFFSET
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.units import Linear
+from orchestrator.cosim import FACTOR, OFFSET, Linear, Plan, PortName
 from orchestrator.program.kind import Kind
 
 _SOURCE = Path(__file__).with_name("events.c")

@@ -20,8 +20,7 @@ from fmus.native.emit import closed, number_in_c, quoted
 from fmus.native.pieces import array, function
 from fmus.native.translator import deepest
 from fmus.ports.definition import Definition
-from orchestrator.cosim.plan import Plan
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import Plan, PortName
 from orchestrator.machine.errors import InputError
 from orchestrator.program.writer import CALLS, Text, Unsupported, head_of
 

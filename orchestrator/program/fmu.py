@@ -36,9 +36,7 @@ from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, 
 from fmus.ports.description_fmi3 import terminals_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
-from orchestrator.cosim.plan import Plan
-from orchestrator.cosim.stages import Visit
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import Plan, PortName, Visit
 from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.file_names import file_name

@@ -11,7 +11,7 @@ from threading import local
 import numpy as np
 from fmpy import platform_tuple
 
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import Experiment
 from orchestrator.machine.cache import read_cached
 from orchestrator.machine.compilers import (
     ANY_PROCESSOR,

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from fmus.ports.reducer import Reducer
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import PortName, System
 from orchestrator.vehicle.reduction import sources_of
 from orchestrator.vehicle.signals import Loop
 

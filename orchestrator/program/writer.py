@@ -27,11 +27,18 @@ from fmus.native.reducer import ReducerText
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
 from fmus.ports.reducer import Reducer
-from orchestrator.cosim.plan import Plan
-from orchestrator.cosim.stages import Stage, Stages, Visit, stages_of, types_read
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim import (
+    Connection,
+    Linear,
+    Mapped,
+    Plan,
+    PortName,
+    Stage,
+    Stages,
+    Visit,
+    stages_of,
+    types_read,
+)
 from orchestrator.machine.errors import InputError, listed
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
 from orchestrator.program.kind import EULER, Kind

@@ -18,7 +18,7 @@ from typing import TypedDict, Unpack
 
 from fmus.discovery import fingerprint
 from fmus.kinds import AUTO, FMI_VERSIONS, KINDS, NATIVE, PYTHON
-from orchestrator.cosim.formats.ssp.writer import ssp_bytes
+from orchestrator.cosim import ssp_bytes
 from orchestrator.machine.cache import made_once, read_cached, users_folder
 from orchestrator.machine.children import run_module
 from orchestrator.machine.compilers import compiler_for

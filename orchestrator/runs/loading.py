@@ -12,11 +12,7 @@ from typing import Any, TypeVar
 
 from fmus.discovery import ORIGIN, origin_of
 from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
-from orchestrator.cosim.formats.osp import read_osp
-from orchestrator.cosim.formats.ssp.reader import read_ssp
-from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Component, PortName, System, read_component, read_osp, read_ssp
 from orchestrator.figures.run_figures import check_figure
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.user_files import is_folder

@@ -9,19 +9,27 @@ from pathlib import Path
 from typing import Any
 
 from auv_fmu.paper.euler import STEP
-from orchestrator.cosim.experiment import (
+from orchestrator.cosim import (
+    PYTHON_LOOP,
+    Alter,
+    Ending,
+    Event,
+    Events,
     Experiment,
+    Hook,
+    InputTable,
+    Isolation,
+    Observer,
+    Plan,
+    Playback,
+    PortName,
+    Set,
+    Stepping,
+    System,
+    choose_loop,
+    make_plan,
+    simulate_plan,
 )
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.hooks.events import Alter, Event, Events, Set
-from orchestrator.cosim.hooks.hook import Hook
-from orchestrator.cosim.hooks.timing import InputTable, Playback
-from orchestrator.cosim.loop import PYTHON_LOOP, Stepping, choose_loop
-from orchestrator.cosim.observers.observer import Ending, Observer
-from orchestrator.cosim.plan import Plan, make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import Identity
 from orchestrator.runs.bundle import current_fmus

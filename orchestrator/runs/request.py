@@ -16,17 +16,18 @@ from pathlib import Path
 from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
 
 from fmus.kinds import AUTO, KindName
-from orchestrator.cosim.experiment import (
+from orchestrator.cosim import (
+    LOOPS,
+    Checkpoints,
     CouplingName,
     Experiment,
+    Isolation,
+    LoopName,
     Order,
+    RealTime,
+    Selection,
+    TableFormat,
 )
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.hooks.checkpoint import Checkpoints
-from orchestrator.cosim.hooks.timing import RealTime
-from orchestrator.cosim.loop import LOOPS, LoopName
-from orchestrator.cosim.observers.files import TableFormat
-from orchestrator.cosim.observers.observer import Selection
 from orchestrator.machine.texts import literal
 
 P = ParamSpec("P")

@@ -23,15 +23,22 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.fmi.binary import runs_python
-from orchestrator.cosim.loop import PYTHON_LOOP
-from orchestrator.cosim.observers.files import TABLE_FORMATS, TableFormat
-from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import TYPES, Standing, StringTable
+from orchestrator.cosim import (
+    PYTHON_LOOP,
+    TABLE_FORMATS,
+    TYPES,
+    Ending,
+    Experiment,
+    Header,
+    Occurrence,
+    PortName,
+    Standing,
+    StringTable,
+    System,
+    Table,
+    TableFormat,
+    runs_python,
+)
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError, did_you_mean

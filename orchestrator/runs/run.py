@@ -15,12 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.hooks.checkpoint import Checkpoints
-from orchestrator.cosim.hooks.hook import Hook
-from orchestrator.cosim.hooks.timing import RealTime
-from orchestrator.cosim.observers.files import TABLE_FORMATS
-from orchestrator.cosim.observers.observer import Ending, Observer, Progress, Selection
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    TABLE_FORMATS,
+    Checkpoints,
+    Ending,
+    Hook,
+    Observer,
+    Progress,
+    RealTime,
+    Selection,
+    System,
+)
 from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows

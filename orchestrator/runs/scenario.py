@@ -23,29 +23,28 @@ from auv_fmu.guidance import path_planner
 from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
-from orchestrator.cosim.experiment import Order
-from orchestrator.cosim.hooks.events import (
+from orchestrator.cosim import (
+    TYPES,
     Action,
     Alter,
     Condition,
     Event,
     Freeze,
+    InputTable,
+    Linear,
+    Mapped,
+    Order,
+    PortName,
     Release,
     Reset,
     Set,
-    Stop,
-)
-from orchestrator.cosim.hooks.timing import InputTable
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped
-from orchestrator.cosim.system.values import (
-    TYPES,
     Standing,
+    Stop,
     StringTable,
+    System,
     Value,
+    Variable,
 )
-from orchestrator.cosim.system.variables import Variable
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.file_names import file_name
 from orchestrator.machine.schema import flatten

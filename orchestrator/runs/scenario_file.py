@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import Experiment
 from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.vehicle.signals import STANDARD
 

@@ -9,10 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from fmus.discovery import name_of
-from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.connection import Connection, join_terminals
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    Component,
+    Connection,
+    PortName,
+    System,
+    join_terminals,
+    read_component,
+)
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, for_each, vehicle_names

@@ -14,13 +14,17 @@ import numpy as np
 from auv_fmu.language.variable import Refusal
 from fmus.ports.definition import Definition
 from fmus.ports.port import Port
-from orchestrator.cosim.experiment import Experiment, Order
-from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import (
+    Ending,
+    Experiment,
+    Header,
+    Order,
+    PortName,
+    System,
+    Table,
+    Value,
+    make_plan,
+)
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of

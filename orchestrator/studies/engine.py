@@ -13,10 +13,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from orchestrator.cosim.experiment import Order
-from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, choose_loop
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import LOOPS, PYTHON_LOOP, Order, PortName, choose_loop, make_plan
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of

@@ -15,8 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from fmus.ports.reducer import Reducer, read_reducer
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.variables import Variable
+from orchestrator.cosim import System, Variable
 from orchestrator.figures.study_values import is_known, names_of
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder

@@ -11,10 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
-from orchestrator.cosim.system.variables import Variable
+from orchestrator.cosim import PortName, System, Value, Variable
 from orchestrator.machine.errors import Findings, InputError, reason, shortened
 from orchestrator.machine.texts import is_finite, literal
 from orchestrator.runs.preparation import Prepared, prepare

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
-from orchestrator.cosim.experiment import OrderName
+from orchestrator.cosim import OrderName
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.file_names import file_name
 from orchestrator.machine.user_files import read_text

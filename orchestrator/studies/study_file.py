@@ -14,9 +14,7 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Experiment, PortName, System
 from orchestrator.figures.study_values import (
     CHARTS,
     INFLUENCE,

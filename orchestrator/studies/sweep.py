@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
-from orchestrator.cosim.loop import LOOPS, LoopName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import LOOPS, LoopName, System
 from orchestrator.figures.study_values import FigureEntry
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError

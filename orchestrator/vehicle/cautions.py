@@ -16,11 +16,7 @@ from auv_fmu.paper.observer import Form, exact_gain
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from fmus.ports.reducer import read_reducer
-from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import Ending, Header, PortName, System, Table, Value
 from orchestrator.vehicle.index import largest_bound, vertical_passed
 from orchestrator.vehicle.reduction import Reduction, reductions_of
 from orchestrator.vehicle.signals import (

@@ -11,8 +11,7 @@ import numpy as np
 
 from fmus.native.names import RUNTIME
 from fmus.ports.reducer import Reducer
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import Experiment, Value
 from orchestrator.machine.compilers import (
     EXPORTED,
     FLAGS,

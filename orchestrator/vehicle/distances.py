@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.vehicle.signals import Loop, Needs
 
 #: The index of several vehicles: its name in files, and in words.

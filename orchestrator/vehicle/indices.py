@@ -16,10 +16,7 @@ import numpy as np
 from auv_fmu.language.quantities import member_of
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer, read_reducer
-from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Ending, Header, PortName, System, Table
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.distances import (
     SMALLEST_DISTANCE,

@@ -20,11 +20,7 @@ from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import Theorem, theorem
 from auv_fmu.proof.gain_conditions import observer_rate
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
-from orchestrator.cosim.observers.files import CsvLines
-from orchestrator.cosim.observers.observer import Ending, Header, every
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import CsvLines, Ending, Header, PortName, System, Table, every
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.cautions import gain_of_a_step, values_of
 from orchestrator.vehicle.signals import (

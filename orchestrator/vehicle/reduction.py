@@ -16,9 +16,7 @@ import numpy as np
 from fmus.ports.groups import SCOPE, compiled, gathered
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.observer import Header
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import Experiment, Header, Value
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.compiled_reducers import CompiledReduction, Raised, library_of
 from orchestrator.vehicle.signals import Loop

@@ -17,10 +17,7 @@ from auv_fmu.language.quantities import member_name
 from auv_fmu.paper.attitude import rotation_from_euler
 from auv_fmu.paper.control_point import control_point
 from auv_fmu.paper.vehicle import Vehicle
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import PortName, System, Table, Value
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.file_names import file_name
 

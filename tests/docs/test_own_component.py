@@ -20,7 +20,7 @@ from auv_fmu import Variable
 from fmus import check
 from fmus.ports.behaviour import HOOKS
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import Experiment
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.platforms import TARGETS
 from orchestrator.runs.loading import load_scenario

@@ -19,7 +19,7 @@ from fmpy.simulation import instantiate_fmu
 
 from fmus.kinds import NATIVE, PYTHON
 from orchestrator import simulate
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import Experiment
 from orchestrator.exchange.hosts import comparison
 from orchestrator.exchange.hosts.comparison import HOSTS
 from orchestrator.exchange.hosts.here import real_outputs

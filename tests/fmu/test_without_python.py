@@ -14,9 +14,7 @@ import numpy as np
 import pytest
 from fmpy.build import build_platform_binary
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Experiment, System, Table
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.platforms import TARGETS
 from support.hosts import bare_root, libraries_of

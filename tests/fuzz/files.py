@@ -38,13 +38,8 @@ import numpy as np
 
 from orchestrator import Result, simulate
 from orchestrator.commands.main import main as auv_fmu
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.formats.ssp.writer import ssp_bytes
+from orchestrator.cosim import Experiment, Linear, Mapped, Observer, Plan, Table, ssp_bytes
 from orchestrator.cosim.observers.files import CsvFile
-from orchestrator.cosim.observers.observer import Observer
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import Plan
-from orchestrator.cosim.system.units import Linear, Mapped
 from orchestrator.exchange import verify
 from orchestrator.machine import user_files
 from orchestrator.machine.disk import _process_folder

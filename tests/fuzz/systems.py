@@ -52,16 +52,21 @@ from fuzz.components import (
     function,
     names_of,
 )
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import Plan, make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.component import Component as Fmu
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection, can_feed
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim import Component as Fmu
+from orchestrator.cosim import (
+    Connection,
+    Experiment,
+    Linear,
+    Mapped,
+    Plan,
+    PortName,
+    System,
+    Table,
+    make_plan,
+    read_component,
+    simulate_plan,
+)
+from orchestrator.cosim.system.connection import can_feed
 from orchestrator.live import module
 from orchestrator.live.module import MODULE
 from orchestrator.live.programs import OF_PROGRAM, Source

@@ -32,7 +32,7 @@ from hypothesis import strategies as st
 
 from orchestrator.commands import many_runs
 from orchestrator.commands.main import main
-from orchestrator.cosim.hooks.checkpoint import Checkpoints
+from orchestrator.cosim import Checkpoints
 from orchestrator.exchange import release
 from orchestrator.figures import drawing
 from orchestrator.figures.run_figures import figure_files

@@ -53,6 +53,9 @@ DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|language\.build\.Untranslat
 TRANSLATED = re.compile(r"fmus\.(documentation|language|native|script)(\.|$)")
 TRANSLATING = (("program",), ("vehicle", "compiled_reducers"))
 
+#: The master, whose modules are private.
+DOOR = ROOT / "orchestrator" / "cosim"
+
 #: Rooms that run any system. Components are built with the lower one.
 GENERAL = ("machine", "cosim")
 
@@ -150,6 +153,23 @@ def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
     for path, name in modules("orchestrator"):
         if name and name[0] in GENERAL:
             assert {one[0] for one in imports(path)}.isdisjoint(("auv_fmu", "fmus")), path
+
+
+#: So many names are taken through the door of the master. Fewer is better.
+MOST_NAMES = 74
+
+
+def test_the_master_is_used_through_its_door_only():
+    """Only tests, measurements and tools may look inside."""
+    folders = [folder_of("orchestrator"), folder_of("fmus"), ROOT / "examples"]
+    taken = set()
+    for path in (path for folder in folders for path in folder.rglob("*.py")):
+        if DOOR not in path.parents:
+            inside = [one for one in imports(path) if one[:2] == ("orchestrator", "cosim")]
+            taken |= {one[2] for one in inside}
+            assert all(len(one) == 3 for one in inside), path
+    assert taken == set(import_module("orchestrator.cosim").__all__)
+    assert len(taken) <= MOST_NAMES
 
 
 def test_components_are_built_with_the_lowest_room_of_the_orchestrator_only():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import System
 
 
 def fleet_of(one: System, n: int, between: str = ".") -> System:

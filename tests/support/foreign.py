@@ -7,7 +7,7 @@ from zlib import crc32
 
 from pythonfmu import FmuBuilder
 
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import System
 from support.small_fmus import connected, constants, description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("foreign.c")

@@ -9,12 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from fmus.kinds import NATIVE, PYTHON
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.observer import Ending
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import Ending, Experiment, PortName, Table, make_plan, simulate_plan
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop

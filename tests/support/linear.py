@@ -8,14 +8,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    Connection,
+    Experiment,
+    PortName,
+    System,
+    Table,
+    make_plan,
+    read_component,
+    simulate_plan,
+)
 from support.small_fmus import description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("linear.c")

@@ -9,10 +9,7 @@ from typing import NamedTuple
 
 from hypothesis import strategies as st
 
-from orchestrator.cosim.hooks.events import Alter, Event
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim import Alter, Connection, Event, Linear, Mapped, System
 from support.small_fmus import (
     connected,
     constants,

@@ -5,10 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Experiment, Isolation, System, Table
 from support.runs import run_table
 from support.small_fmus import connected, description, enumeration, unknown, variable, write
 

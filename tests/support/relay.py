@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import System
 from support.small_fmus import connected, description, unknown, variable, write
 
 _SOURCE = Path(__file__).with_name("relay.c")

@@ -8,9 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Experiment, System, Table
 from orchestrator.machine.compilers import machines_compiler
 
 #: How the host calls the types of FMI.

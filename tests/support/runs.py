@@ -8,15 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.experiment import Experiment, Order
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.hooks.hook import Hook
-from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim import (
+    Experiment,
+    Hook,
+    Isolation,
+    Order,
+    System,
+    Table,
+    choose_loop,
+    make_plan,
+    simulate_plan,
+)
 from orchestrator.cosim.observers.files import CsvFile
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.structure import System
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, prepare_request, with_companion
 from orchestrator.runs.request import Request

@@ -14,11 +14,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import Connection, PortName, System, Value, read_component
 
 _HERE = Path(__file__).parent
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.cosim import StringTable, System
 from orchestrator.cosim.fmi.instance import Part
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import StringTable
 from support.archives import fmu, variable
 from support.small_fmus import connected
 

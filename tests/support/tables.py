@@ -9,10 +9,7 @@ from typing import Any
 import numpy as np
 
 from auv_fmu.language.quantities import ETA, NU, TAU
-from orchestrator.cosim.experiment import Experiment, Order
-from orchestrator.cosim.observers.observer import Header
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import Experiment, Header, Order, PortName, Table
 from orchestrator.vehicle.signals import STANDARD, Loop
 
 COLUMNS = (

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import fmpy
 
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import System, Value
 from support.small_fmus import connected, description_of_fmi3, write
 
 _SOURCE = Path(__file__).with_name("typed.c")

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import System
 from orchestrator.live.assembly import live_script
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.wiring import closed_loop

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cosim.formats.ssp.reader import read_ssp
-from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim import read_component, read_ssp
 from orchestrator.machine import user_files
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError

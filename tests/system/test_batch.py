@@ -20,10 +20,7 @@ import pytest
 from fmus.kinds import AUTO
 from orchestrator import sweep
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Order
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Order, PortName, System, write_ssp
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario

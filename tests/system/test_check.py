@@ -13,12 +13,8 @@ import pytest
 
 from orchestrator.commands import check
 from orchestrator.commands.main import main
+from orchestrator.cosim import Connection, PortName, System, read_component, write_ssp
 from orchestrator.cosim.formats.ssp import STRUCTURE
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare

@@ -13,12 +13,8 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim import Checkpoints, Ending, Run, System, write_ssp
 from orchestrator.cosim.hooks import checkpoint
-from orchestrator.cosim.hooks.checkpoint import Checkpoints
-from orchestrator.cosim.hooks.hook import Run
-from orchestrator.cosim.observers.observer import Ending
-from orchestrator.cosim.system.structure import System
 from orchestrator.runs.bundle import current_fmus
 from support import others, typed
 from support.fleets import fleet_of

@@ -14,9 +14,7 @@ from auv_fmu.paper.observer import Form
 from auv_fmu.paper.output_feedback import Gains
 from auv_fmu.paper.plant import RollAxis
 from auv_fmu.paper.saturation import Saturation
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import PortName, System, Table
 from orchestrator.vehicle.indices import metrics_of
 from orchestrator.vehicle.signals import tracking_error, true_control_point
 from support.runs import final_error, run

@@ -19,12 +19,7 @@ from hypothesis import strategies as st
 
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.formats.ssp.reader import read_ssp
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.units import Linear, Mapped
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import Connection, Linear, Mapped, PortName, Value, read_ssp, write_ssp
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
 from support import typed

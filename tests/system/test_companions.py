@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import PortName, Table
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request

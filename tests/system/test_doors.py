@@ -14,8 +14,8 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.formats.osp import OSP_STRUCTURE, write_osp
-from orchestrator.cosim.formats.ssp.writer import write_ssp
+from orchestrator.cosim import write_osp, write_ssp
+from orchestrator.cosim.formats.osp import OSP_STRUCTURE
 from orchestrator.machine.errors import InputError
 from support.archives import archive, component, described, fmu, system, variable
 from support.others import build

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Connection, Experiment, PortName, System, read_component
 from support.others import WAYS, build, run
 from support.texts import mentions
 from support.tiers import slow

@@ -19,7 +19,7 @@ from auv_fmu.paper import output_feedback, plant
 from auv_fmu.paper.disturbance import disturbance
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion

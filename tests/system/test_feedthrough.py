@@ -12,14 +12,16 @@ import pytest
 
 from orchestrator import Result, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.hooks.checkpoint import Checkpoints
-from orchestrator.cosim.hooks.hook import Run
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    Checkpoints,
+    Experiment,
+    Run,
+    System,
+    Table,
+    make_plan,
+    simulate_plan,
+    write_ssp,
+)
 from support.linear import Part, linear, system_of
 from support.texts import mentions
 

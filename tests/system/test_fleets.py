@@ -10,8 +10,7 @@ import pytest
 
 from orchestrator import load, read, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import System, write_ssp
 from support.fleets import fleet_of
 
 STOP = 1.0

@@ -14,13 +14,15 @@ import pytest
 
 from orchestrator import read
 from orchestrator.commands.main import main
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.hooks.timing import Playback
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear
+from orchestrator.cosim import (
+    Connection,
+    Linear,
+    Playback,
+    PortName,
+    System,
+    read_component,
+    write_ssp,
+)
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.runs.result import read_result
 from orchestrator.runs.scenario import Inputs, read_inputs

@@ -17,9 +17,7 @@ import pytest
 from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands import exchange
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Experiment, PortName, System
 from orchestrator.exchange.hosts import comparison, here
 from orchestrator.exchange.hosts.comparison import HOSTS, Host, compare
 from orchestrator.exchange.hosts.environments import folder_of, is_whole

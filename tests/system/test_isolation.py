@@ -17,16 +17,19 @@ from uuid import uuid4
 import numpy as np
 import pytest
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.loop import LOOPS, choose_loop
-from orchestrator.cosim.observers.observer import Header
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import (
+    LOOPS,
+    Experiment,
+    Header,
+    Isolation,
+    System,
+    Table,
+    choose_loop,
+    make_plan,
+    read_component,
+    simulate_plan,
+    write_ssp,
+)
 from orchestrator.machine.errors import InputError, StartError
 from orchestrator.runs.tables import read_rows
 from orchestrator.runs.wiring import closed_loop

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import auv_fmu
 import fmus
 from fmus.ports.port import Port
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import Experiment
 from orchestrator.runs.scenario import names, read_scenario
 from support.instances import component
 from support.kinds import Outcome, difference, outcome

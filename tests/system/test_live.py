@@ -16,8 +16,7 @@ import pytest
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.cosim.observers.observer import Ending
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Ending, Table
 from orchestrator.live import assembly, module, presets
 from orchestrator.live.assembly import ENGINE
 from orchestrator.live.module import live_module

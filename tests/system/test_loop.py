@@ -16,18 +16,24 @@ from hypothesis import strategies as st
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import (
+    LOOPS,
+    Alter,
+    Event,
+    Events,
+    Experiment,
+    Isolation,
+    Linear,
+    PortName,
+    Run,
+    System,
+    Table,
+    choose_loop,
+    make_plan,
+    simulate_plan,
+)
 from orchestrator.cosim.fmi.instance import Ended
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.hooks.events import Alter, Event, Events
-from orchestrator.cosim.hooks.hook import NEVER, Run
-from orchestrator.cosim.loop import LOOPS, choose_loop
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear
+from orchestrator.cosim.hooks.hook import NEVER
 from orchestrator.machine.errors import StartError
 from orchestrator.runs.loading import load
 from orchestrator.runs.wiring import closed_loop

@@ -16,19 +16,22 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 from fmpy.util import read_csv
 
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import (
+    LOOPS,
+    Connection,
+    Experiment,
+    PortName,
+    System,
+    Table,
+    choose_loop,
+    make_plan,
+    read_component,
+    read_ssp,
+    simulate_plan,
+    ssp_bytes,
+)
 from orchestrator.cosim.fmi.binary import check_place
-from orchestrator.cosim.formats.ssp.reader import read_ssp
-from orchestrator.cosim.formats.ssp.writer import ssp_bytes
-from orchestrator.cosim.loop import LOOPS, choose_loop
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.stages import arrange
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
 from orchestrator.runs.tables import read_columns, read_rows

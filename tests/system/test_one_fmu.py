@@ -23,8 +23,7 @@ from fmpy.validation import validate_fmu
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.variables import Variable
+from orchestrator.cosim import PortName, Variable
 from orchestrator.runs.result import Result
 from support.texts import mentions
 from support.tiers import slow

@@ -12,13 +12,8 @@ import pytest
 
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
+from orchestrator.cosim import Experiment, Isolation, System, Table, make_plan, simulate_plan
 from orchestrator.cosim.stages import arrange
-from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare

@@ -12,9 +12,7 @@ from auv_fmu.guidance import path_planner
 from auv_fmu.guidance.path_planner import Waypoints
 from orchestrator import load
 from orchestrator.commands.main import main
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import PortName, System, read_component
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import impossible_paths, read_scenario
 from orchestrator.runs.wiring import closed_loop

@@ -13,10 +13,7 @@ from fmpy.util import read_csv, read_ref_opt_file, write_csv
 
 from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import INITIAL, Experiment, OrderName
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import INITIAL, Experiment, OrderName, PortName, System, read_component
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.wiring import closed_loop

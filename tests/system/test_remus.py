@@ -10,7 +10,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.result import loops_in
 from orchestrator.runs.scenario import read_scenario

@@ -17,8 +17,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.plan import make_plan
+from orchestrator.cosim import Experiment, make_plan
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
 from orchestrator.runs.preparation import Prepared

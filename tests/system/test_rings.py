@@ -11,17 +11,19 @@ import fmpy
 import numpy as np
 import pytest
 
-from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim import (
+    Checkpoints,
+    Experiment,
+    Isolation,
+    PortName,
+    Run,
+    System,
+    Table,
+    make_plan,
+    simulate_plan,
+)
 from orchestrator.cosim.fmi.instance import ComponentFailed
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.hooks.checkpoint import Checkpoints
-from orchestrator.cosim.hooks.hook import Run
 from orchestrator.cosim.loop import compile_stepper
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
 from orchestrator.machine.errors import InputError
 from support.linear import QUARTER_TRUCK, SINE, TWO_MASSES, Model, Part, error, linear, system_of
 from support.runs import run_table

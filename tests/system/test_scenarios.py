@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import PortName, Table
 from orchestrator.paper.claims import (
     EFFORT_PD,
     EFFORT_PROPOSED,

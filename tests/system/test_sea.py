@@ -13,7 +13,7 @@ from auv_fmu.water.ocean_current import Variation
 from auv_fmu.water.sea import Sea
 from orchestrator import read
 from orchestrator.commands.main import main
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import PortName
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.signals import tracking_error

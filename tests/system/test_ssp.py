@@ -10,7 +10,8 @@ from fmpy.ssp.simulation import simulate_ssp
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.formats.ssp.writer import structure_xml, write_ssp
+from orchestrator.cosim import write_ssp
+from orchestrator.cosim.formats.ssp.writer import structure_xml
 from orchestrator.machine.errors import InputError
 from support.archives import (
     archive,

@@ -20,13 +20,17 @@ from hypothesis import strategies as st
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.formats.ssp.writer import write_ssp
-from orchestrator.cosim.observers.observer import Ending, Header, Selection
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim import (
+    Ending,
+    Experiment,
+    Header,
+    Isolation,
+    Selection,
+    System,
+    Table,
+    Value,
+    write_ssp,
+)
 from orchestrator.figures.drawing import compose
 from orchestrator.figures.plot import plot
 from orchestrator.figures.run_figures import FIGURES

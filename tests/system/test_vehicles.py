@@ -10,8 +10,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import PortName, System
 from orchestrator.runs.wiring import read_wiring
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns

@@ -12,15 +12,17 @@ from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
 
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.hooks.events import Events
+from orchestrator.cosim import (
+    Events,
+    Experiment,
+    Linear,
+    PortName,
+    System,
+    Table,
+    make_plan,
+    simulate_plan,
+)
 from orchestrator.cosim.observers.files import CsvFile, ParquetFile
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_events
 from support import others, typed

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import Ending, Header, Occurrence, PortName, Table
 from orchestrator.figures.style import Drawn
 from orchestrator.live.view import Stored, view_page
 from orchestrator.runs.result import read_result

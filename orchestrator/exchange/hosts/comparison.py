@@ -17,9 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Experiment, System, Table
 from orchestrator.exchange.hosts import drivers, here
 from orchestrator.exchange.hosts.environments import python_with
 from orchestrator.exchange.verify import ways

@@ -19,10 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.formats.osp import write_osp
-from orchestrator.cosim.formats.ssp.writer import PARAMETER_SET, write_ssp
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import PARAMETER_SET, Experiment, System, write_osp, write_ssp
 from orchestrator.exchange.hosts.drivers import write_rows
 from orchestrator.machine.errors import InputError
 

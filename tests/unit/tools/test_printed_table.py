@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from orchestrator import simulate
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import PortName
 from orchestrator.paper.claims import approach_of
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.batch_engine import BatchEngine

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from orchestrator.cosim.observers.observer import Ending, Occurrence
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Ending, Occurrence, Table
 from orchestrator.figures.drawing import compose, save
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn

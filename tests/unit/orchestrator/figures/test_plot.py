@@ -5,9 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from orchestrator.cosim.observers.observer import Ending, Occurrence
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import Ending, Occurrence, PortName, Table
 from orchestrator.figures.drawing import save
 from orchestrator.figures.plot import plot, told_apart
 from orchestrator.figures.style import Drawn

@@ -10,8 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import PortName, Table
 from orchestrator.figures.drawing import compose, draw, overlay
 from orchestrator.figures.run_figures import FIGURES, check_figure
 from orchestrator.figures.style import Drawn

@@ -9,8 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.figure import Figure
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.cosim import Ending, Experiment, Header
 from orchestrator.figures.visible import VisibleRows, chatters, draw_signal, moving_mean
 
 #: Rows of runs that are kept whole, and how many divisions they are first divided into.

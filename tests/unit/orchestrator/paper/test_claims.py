@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from auv_fmu.paper.vehicle import Vehicle, accelerations
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import PortName, Table
 from orchestrator.paper import claims
 from orchestrator.paper.claims import (
     CLAIMS,

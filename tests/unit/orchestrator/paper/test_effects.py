@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim import Table
 from orchestrator.paper import effects
 from orchestrator.paper.effects import EFFECTS, LAMBDAS, NOISE_LEVELS, STEPS, show_effect
 from orchestrator.paper.kept_runs import KeptRun, KeptRuns

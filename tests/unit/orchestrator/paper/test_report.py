@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import PortName, Table
 from orchestrator.paper.kept_runs import Companion, KeptRun
 from orchestrator.paper.report import draw_section, section_text, sections
 from orchestrator.runs.request import Request

@@ -9,21 +9,20 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.hooks.events import (
-    MOST_LISTED,
+from orchestrator.cosim import (
     Action,
     Alter,
     Event,
+    Experiment,
     Freeze,
+    Occurrence,
     Release,
     Reset,
     Set,
     Stop,
-    occurrence,
+    Table,
 )
-from orchestrator.cosim.observers.observer import Occurrence
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.hooks.events import MOST_LISTED, occurrence
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import Text

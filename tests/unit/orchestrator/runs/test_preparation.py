@@ -7,10 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import Connection, PortName, System, read_component
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import check_brings_its_own, is_path, left_behind, read_fmu
 from orchestrator.runs.preparation import DEFAULT_STEP, prepare

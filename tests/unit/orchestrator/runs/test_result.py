@@ -19,9 +19,7 @@ from hypothesis import strategies as st
 import orchestrator
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers.observer import Ending, Header, Occurrence
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import Ending, Experiment, Header, Occurrence, PortName
 from orchestrator.figures.drawing import save
 from orchestrator.machine.compilers import find_compiler
 from orchestrator.machine.errors import InputError

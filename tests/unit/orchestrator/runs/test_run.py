@@ -12,7 +12,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim import System
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.run import (
     check_gives_states,

@@ -11,11 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.cosim.hooks.events import Alter, Freeze, Set
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim import Alter, Connection, Freeze, Linear, Mapped, PortName, Set, System
 from orchestrator.machine.errors import InputError, Refused
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare

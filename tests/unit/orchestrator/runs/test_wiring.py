@@ -8,7 +8,7 @@ from zipfile import ZipFile
 import pytest
 
 from orchestrator.commands.check import surprises
-from orchestrator.cosim.system.component import read_component
+from orchestrator.cosim import read_component
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.wiring import closed_loop

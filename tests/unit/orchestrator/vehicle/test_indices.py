@@ -13,13 +13,16 @@ import pytest
 from fmus.language.build import Program
 from fmus.ports.reducer import read_reducer
 from orchestrator import simulate as run
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.loop import choose_loop
-from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.cosim.observers.table import Table
-from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import (
+    Ending,
+    Experiment,
+    Header,
+    PortName,
+    Table,
+    choose_loop,
+    make_plan,
+    simulate_plan,
+)
 from orchestrator.figures.study_values import Values
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.engine import FmuEngine

@@ -12,9 +12,7 @@ import pytest
 
 from auv_fmu import Variable
 from fmus.ports.reducer import read_reducer
-from orchestrator.cosim.experiment import Experiment, Order
-from orchestrator.cosim.observers.observer import Header
-from orchestrator.cosim.system.names import PortName
+from orchestrator.cosim import Experiment, Header, Order, PortName
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle import compiled_reducers, reduction
 from orchestrator.vehicle.cautions import WATCHED
