@@ -110,7 +110,7 @@ class CompareTable(TomlTable):
     components: dict[str, Name] = entry("Other FMUs, as in the scenario.", "the same")
     wires: dict[str, Name | Literal[False]] = entry("Other wires, as in the scenario.", "the same")
     parameters: dict[str, Any] = entry(
-        "Other parameters, as in the scenario; those of the command line win over them.",
+        "Other parameters, as in the scenario; values from the command line win over them.",
         "the same, where its components have them",
     )
 

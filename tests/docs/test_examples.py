@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import tomllib
 from importlib.util import find_spec
 from inspect import signature
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -272,3 +274,10 @@ def test_a_trajectory_of_ones_own_is_that_of_its_table(capsys: pytest.CaptureFix
     assert np.abs(result["planner.dy_d.x"] - (1j * w * x).imag).max() < 1e-5
     assert np.abs(result["planner.ddy_d.y"] - ((2j * w) ** 2 * y).imag).max() < 1e-3
     assert max(result.metrics()["final_error"]) < 0.5
+
+
+def test_master_runs_an_ssp_as_its_page_says(native, workplace, capsys):
+    shutil.copy(native / "auv.ssp", "system.ssp")
+    [code] = blocks(DOCS / "how-to" / "master.md", "python")
+    exec(compile(code.text.replace("gain.y", "plant.eta.x"), "master.md", "exec"), {})
+    assert isfinite(float(capsys.readouterr().out))
