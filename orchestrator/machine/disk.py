@@ -144,9 +144,7 @@ def hold_lock(folder: Path, wait: bool = False) -> Iterator[None]:
     finally:
         # While it is locked: later, it could be another process's.
         is_open = not _remove_lock(folder / LOCK)
-        with suppress(OSError):
-            # An FMU may have closed its descriptor.
-            lock.release()
+        _release(lock)
         if is_open:
             _remove_lock(folder / LOCK)
 
@@ -160,6 +158,12 @@ def _remove_lock(path: Path) -> bool:
         except PermissionError:
             return False
     return True
+
+
+def _release(lock: BaseFileLock) -> None:
+    with suppress(OSError):
+        # An FMU may have closed its descriptor.
+        lock.release()
 
 
 def _lock_of(folder: Path) -> BaseFileLock:
@@ -192,7 +196,7 @@ def _process_folder() -> TemporaryDirectory[str]:
         lock = _lock_of(path)
         lock.acquire(blocking=False)
         # Held until the process ends; Windows removes no file that is open.
-        atexit.register(lock.release)
+        atexit.register(_release, lock)
         (path / _MARKER).write_text(path.name, encoding="utf-8")
     return folder
 

@@ -11,7 +11,7 @@ import re
 import types
 import typing
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, NamedTuple, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -260,22 +260,3 @@ def _at(content: Any, path: Sequence[str | int]) -> Any:
     for part in path:
         content = content[part]
     return content
-
-
-def flatten(
-    table: Mapping[str, Any], is_value: Callable[[Any], bool] = lambda _: False, prefix: str = ""
-) -> Iterator[tuple[str, Any]]:
-    """Flatten a table to values by dotted names, whether its keys were quoted or dotted.
-
-    Args:
-        table: with tables in it.
-        is_value: whether a table in it is a value itself.
-        prefix: of all names.
-
-    """
-    for key, value in table.items():
-        name = f"{prefix}.{key}" if prefix else key
-        if isinstance(value, Mapping) and not is_value(value):
-            yield from flatten(value, is_value, name)
-        else:
-            yield name, value

@@ -1,12 +1,13 @@
-"""Numbers, truth values and texts as files write them, and patterns of names."""
+"""Numbers, truth values and texts as files write them, patterns of names, tables."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from fnmatch import fnmatchcase
 from math import isfinite
+from typing import Any
 
 from orchestrator.machine.errors import InputError, did_you_mean
 
@@ -108,3 +109,22 @@ def matches(name: str, pattern: str) -> bool:
     escaped = pattern.replace("[", "[[]")
     is_member = name.startswith((f"{pattern}.", f"{pattern}["))
     return name == pattern or is_member or fnmatchcase(name, escaped)
+
+
+def flatten(
+    table: Mapping[str, Any], is_value: Callable[[Any], bool] = lambda _: False, prefix: str = ""
+) -> Iterator[tuple[str, Any]]:
+    """Flatten a table to values by dotted names, whether its keys were quoted or dotted.
+
+    Args:
+        table: with tables in it.
+        is_value: whether a table in it is a value itself.
+        prefix: of all names.
+
+    """
+    for key, value in table.items():
+        name = f"{prefix}.{key}" if prefix else key
+        if isinstance(value, Mapping) and not is_value(value):
+            yield from flatten(value, is_value, name)
+        else:
+            yield name, value

@@ -47,8 +47,7 @@ from orchestrator.cosim import (
 )
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.file_names import file_name
-from orchestrator.machine.schema import flatten
-from orchestrator.machine.texts import finite, is_finite, literal
+from orchestrator.machine.texts import finite, flatten, is_finite, literal
 from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.runs import SCENARIOS_FOLDER, find_toml, names_in
 from orchestrator.runs.tables import read_columns, read_rows, records

@@ -23,8 +23,8 @@ from orchestrator.figures.study_values import (
     is_known,
 )
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
-from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, flatten, needed
-from orchestrator.machine.texts import is_finite
+from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, needed
+from orchestrator.machine.texts import flatten, is_finite
 from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.runs import find_toml
 from orchestrator.runs.loading import is_path

@@ -88,6 +88,8 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     before = [*sys.path]
     with pytest.MonkeyPatch.context() as here, redirect_stdout(said):
         here.chdir(folder)
+        # An example has that name, too.
+        here.delitem(sys.modules, "pid", raising=False)
         for language, text in blocks(PAGE, "sh", "diff", "python"):
             if language == "diff":
                 patch(folder, text)
@@ -103,7 +105,7 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
                 assert main(shlex.split(line)[1:]) == 0, line
     # Others have components of this name, too.
     sys.path[:] = before
-    sys.modules.pop("pid")
+    sys.modules.pop("pid", None)
     return folder, said.getvalue()
 
 

@@ -58,7 +58,7 @@ def replay(
         for causality in ("input", "output")
     )
     settings = [
-        f"{_LETTERS[component.variable(port).type]} {component.variable(port).valueReference} "
+        f"{_LETTERS[component.variable(port).type]} {component.variable(port).reference} "
         f"{float(value)!r}"
         for port, value in system.parameters_of(name).items()
     ]
@@ -70,7 +70,7 @@ def replay(
         f"{experiment.step!r} {experiment.full_steps} {len(settings)}",
         *settings,
         f"{len(inputs)} {len(outputs)}",
-        " ".join(str(port.valueReference) for port in (*inputs, *outputs)),
+        " ".join(str(port.reference) for port in (*inputs, *outputs)),
         *(" ".join(map(repr, row)) for row in rows),
     ]
     uri = f"file://{'' if str(folder).startswith('/') else '/'}{folder}/resources"

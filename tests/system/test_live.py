@@ -464,7 +464,7 @@ def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, ca
     [
         (
             lambda: module.compiled(presets.bundled().sources),
-            "module.find_spec",
+            "module.zig",
             r"pip install 'auv-fmu\[native\]'",
         ),
         (assembly.bundled, "assembly.shutil.which", "Node.js"),

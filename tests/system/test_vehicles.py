@@ -183,7 +183,6 @@ def test_each_vehicle_of_a_fleet_has_the_numbers_that_it_has_alone():
 FLEET = """
 vehicles = 3
 figure = "comparison"
-compare = "fleet-pd.toml"
 stop_time = 2.0
 
 [components]
@@ -197,20 +196,15 @@ lead = "MotionPlanner"
 "auv*.plant.eta0.y" = { first = 6.0, step = 4.0 }
 auv2.controller.eps_t = 3.0
 
+[compare]
+name = "fleet-pd"
+label = "PD"
+components."auv*.controller" = "PdController"
+wires."auv*.controller.dy" = "auv*.plant.dy"
+
 [[events]]
 at = 1.0
 override = { "auv*.controller.tau.u" = 0.0 }
-"""
-
-FLEET_PD = """
-label = "PD"
-vehicles = 3
-
-[components]
-"auv*.controller" = "PdController"
-
-[wires]
-"auv*.controller.dy" = "auv*.plant.dy"
 """
 
 
@@ -218,7 +212,6 @@ vehicles = 3
 def fleet(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fleet")
     (folder / "fleet.toml").write_text(FLEET, encoding="utf-8")
-    (folder / "fleet-pd.toml").write_text(FLEET_PD, encoding="utf-8")
     return folder
 
 

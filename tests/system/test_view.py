@@ -153,8 +153,10 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results: of a comparison with an event, of three vehicles, and of a planner alone."""
     folder = tmp_path_factory.mktemp("results")
     scenarios = {
-        "both": 'compare = "fig5-pd"\nlabel = "<b>"\nstop_time = 4.0\n'
-        '[[events]]\nat = 1.0\nfor = 2.0\nlose = "controller.tau.r"\nlabel = "no yaw"\n',
+        "both": 'label = "<b>"\nstop_time = 4.0\n'
+        '[compare]\nname = "fig5-pd"\ncomponents.controller = "PdController"\n'
+        'wires."controller.dy" = "plant.dy"\n[[events]]\nat = 1.0\nfor = 2.0\n'
+        'lose = "controller.tau.r"\nlabel = "no yaw"\n',
         "three": "vehicles = 3\nstop_time = 4.0\n[parameters]\n"
         '"auv*.plant.eta0.y" = { first = 6.0, step = 4.0 }\n',
         "alone": 'only = ["planner"]\nstop_time = 4.0\n',

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 
 from orchestrator.figures.run_figures import FLEET
 from orchestrator.figures.study_values import Values
-from orchestrator.machine.schema import flatten
+from orchestrator.machine.texts import flatten
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.studies.study import Study, ready_studies
 from orchestrator.studies.study_file import LABELS, FigureTable, read_study

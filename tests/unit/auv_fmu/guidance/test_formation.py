@@ -281,7 +281,7 @@ def test_changes_that_no_vehicle_can_follow_are_refused(stages, why):
     shapes = {"n": 2, "shape": (Shape.LINE, Shape.COLUMN, Shape.LINE, Shape.LINE)}
     with pytest.raises(ImpossibleFormation) as refused:
         formation.check(DEFAULT._replace(stages=Stages()._replace(**{**shapes, **stages})))
-    assert str(refused.value) == why
+    assert str(refused.value).startswith(why)
 
 
 def test_other_parameters_that_do_not_fit_are_refused():

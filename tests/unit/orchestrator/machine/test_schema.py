@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from pydantic import ConfigDict, Field, model_validator
 
 from orchestrator.machine.errors import Refused
-from orchestrator.machine.schema import Names, OneOf, TomlTable, entries, entry, flatten, needed
+from orchestrator.machine.schema import Names, OneOf, TomlTable, entries, entry, needed
+from orchestrator.machine.texts import flatten
 from support.texts import mentions
 
 
