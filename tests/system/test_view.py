@@ -154,7 +154,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     scenarios = {
         "both": 'label = "<b>"\nstop_time = 4.0\n'
-        '[compare]\nname = "fig5-pd"\ncomponents.controller = "PdController"\n'
+        '[compare]\nname = "fig5-pd"\nlabel = "PD"\ncomponents.controller = "PdController"\n'
         'wires."controller.dy" = "plant.dy"\n[[events]]\nat = 1.0\nfor = 2.0\n'
         'lose = "controller.tau.r"\nlabel = "no yaw"\n',
         "three": "vehicles = 3\nstop_time = 4.0\n[parameters]\n"
