@@ -81,8 +81,9 @@ def test_power_is_that_of_damping_only(parameters, nu, euler):
     phi, theta, _ = euler
     # Of the earth's z-axis in the body, z: d/dt R33 = z_x q - z_y p.
     upright_rate = -sin(theta) * nu[4] - cos(theta) * sin(phi) * nu[3]
-    power = np.dot(mass * nu, dnu) - vehicle.righting_pitch * upright_rate
-    scale = np.dot(mass, np.square(nu)) * (1.0 + max(np.abs(nu)))
+    righting = vehicle.righting_pitch * upright_rate
+    power = np.dot(mass * nu, dnu) - righting
+    scale = np.dot(mass, np.square(nu)) * (1.0 + max(np.abs(nu))) + abs(righting)
     np.testing.assert_allclose(power, -np.dot(damping * nu, nu), rtol=1e-12, atol=1e-12 * scale)
     assert power <= 1e-12 * (scale + 1.0)
 
@@ -98,8 +99,9 @@ def test_power_without_roll_is_that_of_damping_only(parameters, nu, theta, psi):
     rotation = rotation_from_euler(0.0, theta, psi)
     vehicle, roll = parameters.vehicle, parameters.roll
     dnu = plant.accelerations_6dof(vehicle, roll, nu, rotation, NONE_3, NONE_6)
-    power = np.dot(mass * nu, dnu) + vehicle.righting_pitch * sin(theta) * q
-    scale = np.dot(mass, np.square(nu)) * (1.0 + max(np.abs(nu)))
+    righting = vehicle.righting_pitch * sin(theta) * q
+    power = np.dot(mass * nu, dnu) + righting
+    scale = np.dot(mass, np.square(nu)) * (1.0 + max(np.abs(nu))) + abs(righting)
     np.testing.assert_allclose(power, -np.dot(damping * nu, nu), rtol=1e-12, atol=1e-12 * scale)
 
 

@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim import (
-    LOOPS,
     Experiment,
     Header,
     Isolation,
@@ -34,7 +33,7 @@ from orchestrator.machine.errors import InputError, StartError
 from orchestrator.runs.tables import read_rows
 from orchestrator.runs.wiring import closed_loop
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
-from support.machine import contents, start
+from support.machine import LOOPS, contents, start
 from support.runs import run_table, whole
 from support.texts import mentions
 from support.tiers import slow

@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
 from orchestrator.cosim import (
-    LOOPS,
     Alter,
     Event,
     Events,
@@ -37,6 +36,7 @@ from orchestrator.cosim.hooks.hook import NEVER
 from orchestrator.machine.errors import StartError
 from orchestrator.runs.loading import load
 from orchestrator.runs.wiring import closed_loop
+from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
 from support.runs import run_table
 from support.texts import mentions

@@ -17,7 +17,6 @@ from fmpy.ssp.ssd import read_ssd
 from fmpy.util import read_csv
 
 from orchestrator.cosim import (
-    LOOPS,
     Connection,
     Experiment,
     PortName,
@@ -35,6 +34,7 @@ from orchestrator.cosim.stages import arrange
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
 from orchestrator.runs.tables import read_columns, read_rows
+from support.machine import LOOPS
 from support.runs import run, write
 from support.texts import mentions
 from support.tiers import slow
