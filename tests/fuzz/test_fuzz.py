@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack
@@ -12,6 +11,7 @@ from typing import Any
 import pytest
 
 from fuzz import sequences
+from fuzz.crashing import crashing
 from fuzz.mutants import Trials
 from fuzz.sequences import KINDS, SEQUENCES, STATES, attack, unpacked
 from support import states
@@ -94,19 +94,9 @@ def test_constant_of_one_kind_alone_is_noticed(kinds: list[Folders], tmp_path: P
 
 
 def test_call_that_ends_the_process_is_told(kinds: list[Folders], monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(sequences, "serve", _crashing)
-    assert (26, "fmi2DoStep()\nSIGABRT") in attack(kinds[:1], "AuvPlant", SEQUENCES, range(40))
-
-
-def _crashing(*_: object) -> Callable[[sequences.Task], list[sequences.Finding]]:
-    def do(task: sequences.Task) -> list[sequences.Finding]:
-        if 26 in task.seeds:
-            if task.log:
-                task.log.write_text("fmi2DoStep()")
-            os.abort()
-        return []
-
-    return do
+    monkeypatch.setattr(sequences, "serve", crashing)
+    [finding] = attack(kinds[:1], "AuvPlant", SEQUENCES, range(40))
+    assert finding == (26, "fmi2DoStep()\nSIGABRT")
 
 
 #: What a process does with the tasks of the next test. As text: a process of its own cannot import
