@@ -254,8 +254,10 @@ class Ledger:
     def _discard(self) -> None:
         """Remove what nobody else has made, as its name shows."""
         rmtree(self.staging, ignore_errors=True)
-        with suppress(OSError):
-            self._partial.unlink()
+        # A process that was killed when it began the ledger has left one of another token.
+        for partial in self.folder.glob(f"{_PREFIX}{'[0-9a-f]' * 32}.json"):
+            with suppress(OSError):
+                partial.unlink()
 
 
 def _move(source: Path, target: Path) -> None:

@@ -27,7 +27,8 @@ WRITTEN = {"component.py", "page.md"}
 OTHER = "fmus.disturbance_generator.component"
 
 #: Files that the fuzzer reads.
-READ = ("tests/support", "tests/fuzz", "docs/reference/fmi-answers.md")
+READ = ("tests/support", "tests/fuzz", "docs/reference/fmi-answers.md",
+        "docs/reference/fmi-answers.csv")  # fmt: skip
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 

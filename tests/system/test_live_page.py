@@ -238,11 +238,11 @@ def test_what_is_no_number_is_refused_where_it_was_typed(opened, text):
 
 
 def test_value_of_one_loop_can_be_set_in_both_and_taken_back(chromium, tmp_path):
-    (tmp_path / "other.toml").write_text(
-        '[components]\ncontroller = "PdController"\n[wires]\n"controller.dy" = "plant.dy"\n'
-        "[parameters]\nplant.noise.std = 0.01\n"
+    other = (
+        '[compare]\nname = "other"\ncomponents.controller = "PdController"\n'
+        'wires."controller.dy" = "plant.dy"\nparameters.plant.noise.std = 0.01\n'
     )
-    live = live_of(chromium, tmp_path, 'compare = "other.toml"\nstop_time = 5.0\n')
+    live = live_of(chromium, tmp_path, f"stop_time = 5.0\n{other}")
     live.run("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
     before = live.run(TABLE)
     field = "document.querySelector('#groups input[data-name=\"plant.noise.std\"]')"
