@@ -28,6 +28,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from orchestrator.machine.lazy import offered
+
 if TYPE_CHECKING:
     from orchestrator.runs.loading import load
     from orchestrator.runs.result import Result, read
@@ -37,25 +39,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Result", "StudyResult", "load", "read", "simulate", "sweep"]
 
-_MODULES = {
-    "Result": "runs.result",
-    "StudyResult": "studies.study_result",
-    "load": "runs.loading",
-    "read": "runs.result",
-    "simulate": "runs.run",
-    "sweep": "studies.sweep",
-}
-
-
-def __dir__() -> list[str]:
-    """What is to be found here, asked for or not."""
-    return sorted({*globals(), *__all__})
-
-
-def __getattr__(name: str) -> object:
-    """Import what is asked for when it is asked for: `auv-fmu --help` needs none of it."""
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415
-
-    return getattr(import_module(f"orchestrator.{_MODULES[name]}"), name)
+__getattr__, __dir__ = offered(
+    __name__,
+    {
+        "runs.loading": "load",
+        "runs.result": "Result read",
+        "runs.run": "simulate",
+        "studies.study_result": "StudyResult",
+        "studies.sweep": "sweep",
+    },
+)

@@ -28,6 +28,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from orchestrator.machine.lazy import offered
+
 if TYPE_CHECKING:
     from orchestrator.cosim.experiment import (
         INITIAL,
@@ -159,49 +161,34 @@ __all__ = [
     "write_ssp",
 ]
 
-#: Where each name is, by modules.
-_PLACES = {
-    "experiment": "CouplingName Exchange Experiment INITIAL Order OrderName",
-    "fmi.binary": "binary_of check_binary runs_python",
-    "fmi.isolated": "Isolation",
-    "formats.osp": "read_osp write_osp",
-    "formats.ssp.archive": "read_document",
-    "formats.ssp.reader": "bind_parameter_set read_ssp",
-    "formats.ssp.writer": "PARAMETER_SET ssp_bytes write_ssp",
-    "hooks.checkpoint": "Checkpoints",
-    "hooks.events": "Action Alter Condition Event Events Freeze Release Reset Set Stop",
-    "hooks.hook": "Hook Run",
-    "hooks.timing": "InputTable Playback RealTime",
-    "loop": "LOOPS LoopName PYTHON_LOOP Stepping choose_loop",
-    "observers.files": "CsvLines TABLE_FORMATS TableFormat",
-    "observers.observer": "Ending Header Observer Occurrence Progress Selection every",
-    "observers.table": "Table",
-    "plan": "Plan make_plan",
-    "row": "FACTOR OFFSET",
-    "simulation": "simulate_plan simulate_to_end",
-    "stages": "Stage Stages Visit stages_of types_read",
-    "system.component": "Component read_component",
-    "system.connection": "Connection join_terminals",
-    "system.names": "PortName",
-    "system.structure": "System",
-    "system.units": "Linear Mapped",
-    "system.values": "Standing StringTable TYPES Value",
-    "system.variables": "Variable",
-}
-_MODULES = {name: module for module, names in _PLACES.items() for name in names.split()}
-
-
-def __dir__() -> list[str]:
-    """List what is offered, imported or not."""
-    return sorted({*globals(), *__all__})
-
-
-def __getattr__(name: str) -> object:
-    """Import what is asked for."""
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from importlib import import_module  # noqa: PLC0415
-
-    found = getattr(import_module(f"{__name__}.{_MODULES[name]}"), name)
-    globals()[name] = found
-    return found
+__getattr__, __dir__ = offered(
+    __name__,
+    {
+        "experiment": "CouplingName Exchange Experiment INITIAL Order OrderName",
+        "fmi.binary": "binary_of check_binary runs_python",
+        "fmi.isolated": "Isolation",
+        "formats.osp": "read_osp write_osp",
+        "formats.ssp.archive": "read_document",
+        "formats.ssp.reader": "bind_parameter_set read_ssp",
+        "formats.ssp.writer": "PARAMETER_SET ssp_bytes write_ssp",
+        "hooks.checkpoint": "Checkpoints",
+        "hooks.events": "Action Alter Condition Event Events Freeze Release Reset Set Stop",
+        "hooks.hook": "Hook Run",
+        "hooks.timing": "InputTable Playback RealTime",
+        "loop": "LOOPS LoopName PYTHON_LOOP Stepping choose_loop",
+        "observers.files": "CsvLines TABLE_FORMATS TableFormat",
+        "observers.observer": "Ending Header Observer Occurrence Progress Selection every",
+        "observers.table": "Table",
+        "plan": "Plan make_plan",
+        "row": "FACTOR OFFSET",
+        "simulation": "simulate_plan simulate_to_end",
+        "stages": "Stage Stages Visit stages_of types_read",
+        "system.component": "Component read_component",
+        "system.connection": "Connection join_terminals",
+        "system.names": "PortName",
+        "system.structure": "System",
+        "system.units": "Linear Mapped",
+        "system.values": "Standing StringTable TYPES Value",
+        "system.variables": "Variable",
+    },
+)

@@ -1,4 +1,4 @@
-"""Start, stop and steps of a run, t_k = k h; orders, couplings, and longer steps of components."""
+"""Start, stop and steps of a run, t_k = k h; orders and couplings."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from orchestrator.machine.errors import InputError
 #: Orders in which values pass and components are stepped; the first is the default where the FMUs
 #: allow it, else the second.
 OrderName: TypeAlias = Literal["feedthrough", "gauss-seidel", "jacobi"]
-ORDERS: tuple[OrderName, ...] = get_args(OrderName)
-FEEDTHROUGH, GAUSS_SEIDEL, JACOBI = ORDERS
 
 #: One of these, or the names of all components, one stepped after the other.
 Order: TypeAlias = OrderName | list[str] | tuple[str, ...]
@@ -28,11 +26,9 @@ INITIAL = FULL, NONE, ZERO = "full", "none", "zero"
 #: How rings of direct feedthroughs are closed: solved, opened by a delay of a step, or solved with
 #: inputs that change linearly from one communication point to the next.
 CouplingName: TypeAlias = Literal["solve", "delay", "linear"]
-COUPLINGS: tuple[CouplingName, ...] = get_args(CouplingName)
-SOLVE, DELAY, LINEAR = COUPLINGS
 
-#: A rest shorter than this share of the run, and of a step, is a rounding error.
-ROUNDING, _MOST_OF_A_STEP = 1e-9, 1e-3
+#: A rest of a run that is shorter than this share of a step is a rounding error.
+_MOST_OF_A_STEP = 1e-3
 
 #: More steps than this are taken for a mistake.
 MOST_STEPS = 1_000_000_000
@@ -64,11 +60,11 @@ class Experiment:
     Attributes:
         stop_time: end [s]; the last step is shorter if the run is not a multiple of the step.
         step: communication step [s].
-        order: one of :data:`ORDERS`, or the names of all components, one stepped after the other;
+        order: one of `ORDERS`, or the names of all components, one stepped after the other;
             None: `feedthrough` where the outputs of the FMUs follow their inputs between steps,
             else `gauss-seidel`.
         start_time: begin [s].
-        coupling: one of :data:`COUPLINGS`; None: rings are solved where their FMUs allow it, and
+        coupling: one of `COUPLINGS`; None: rings are solved where their FMUs allow it, and
             else delayed.
 
     """
@@ -80,15 +76,15 @@ class Experiment:
     coupling: str | None = None
 
     #: Names that an order and a coupling may have.
-    ORDERS: ClassVar[tuple[OrderName, ...]] = ORDERS
-    COUPLINGS: ClassVar[tuple[CouplingName, ...]] = COUPLINGS
+    ORDERS: ClassVar[tuple[OrderName, ...]] = get_args(OrderName)
+    COUPLINGS: ClassVar[tuple[CouplingName, ...]] = get_args(CouplingName)
 
     #: A difference of times that is smaller than this share of them is a rounding error.
-    ROUNDING: ClassVar[float] = ROUNDING
+    ROUNDING: ClassVar[float] = 1e-9
 
     @staticmethod
     def read_order(text: str) -> Order:
-        """Read an order as a command line has it: one of :data:`ORDERS`, or names with commas."""
+        """Read an order as a command line has it: one of `ORDERS`, or names with commas."""
         if "," in text:
             return tuple(name.strip() for name in text.split(","))
         # Any other name is refused by the experiment.
@@ -111,17 +107,18 @@ class Experiment:
             except OverflowError:
                 raise InputError("times and step must be smaller than 1e308 s") from None
         self.check_step(self.step)
-        if self.coupling not in (None, *COUPLINGS):
-            raise InputError(f"coupling {self.coupling!r}: use one of {', '.join(COUPLINGS)}")
+        if self.coupling not in (None, *self.COUPLINGS):
+            raise InputError(f"coupling {self.coupling!r}: use one of {', '.join(self.COUPLINGS)}")
         if self.coupling == LINEAR and self.order not in (None, GAUSS_SEIDEL, JACOBI):
             raise InputError("coupling linear steps all components at once: leave out the order")
         if self.order is None:
             return
         if not isinstance(self.order, str):
             object.__setattr__(self, "order", tuple(self.order))
-        elif self.order not in ORDERS:
+        elif self.order not in self.ORDERS:
             raise InputError(
-                f"order {self.order!r}: use one of {', '.join(ORDERS)}, or name every component"
+                f"order {self.order!r}: use one of {', '.join(self.ORDERS)}, or name every "
+                "component"
             )
 
     def check_step(self, step: float) -> None:
@@ -209,6 +206,11 @@ class Experiment:
             yield self.rows - 1, t, self.stop_time - t, self.stop_time
 
 
+#: The names, one by one.
+FEEDTHROUGH, GAUSS_SEIDEL, JACOBI = Experiment.ORDERS
+SOLVE, DELAY, LINEAR = Experiment.COUPLINGS
+
+
 # Studies ask again and again.
 @lru_cache
 def _in_steps(length: float, step: float) -> float:
@@ -219,4 +221,4 @@ def _in_steps(length: float, step: float) -> float:
 def _rounded(n: float) -> float:
     """A number of steps; a whole number where it is one apart from rounding."""
     nearest = round(n)
-    return nearest if abs(n - nearest) <= min(ROUNDING * nearest, _MOST_OF_A_STEP) else n
+    return nearest if abs(n - nearest) <= min(Experiment.ROUNDING * nearest, _MOST_OF_A_STEP) else n

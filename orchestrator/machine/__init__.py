@@ -1,1 +1,1 @@
-"""The operating system: errors, files, locks, archives, child processes, interrupts, compilers."""
+"""What any program needs of the operating system, of files and of texts; it knows no FMU."""

@@ -204,8 +204,8 @@ def _reader(path: Path) -> Callable[..., System] | None:
     """The reader of a file or folder; None: it is a scenario."""
     if path.suffix in _READERS or str(path) in names() or not is_folder(path):
         return _READERS.get(path.suffix)
-    is_osp = [(path / name).is_file() for name in _STRUCTURES] == [False, True]
-    return read_osp if is_osp else read_ssp
+    of_ssp, of_osp = ((path / name).is_file() for name in _STRUCTURES)
+    return read_osp if of_osp and not of_ssp else read_ssp
 
 
 def brings_its_own(name: str) -> bool:

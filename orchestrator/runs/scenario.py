@@ -102,11 +102,6 @@ def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[
     return replaced | {key: value for key, value in table.items() if star not in key or not names}
 
 
-def role_of(component: str) -> str:
-    """The name of a component in its innermost system."""
-    return component.rpartition(".")[2]
-
-
 @dataclass(frozen=True)
 class Inputs:
     """A table of inputs, as a scenario or the command line names it.

@@ -61,9 +61,6 @@ from orchestrator.machine.errors import (
 from orchestrator.machine.interrupts import Interrupts
 from orchestrator.machine.operating_system import can_isolate, end_first_without_memory
 
-#: Default limit of a call [s]: an FMU may fetch a licence or read maps first.
-STEP_TIMEOUT = 60.0
-
 #: Limit for the start of a process [s].
 _START = 60.0
 
@@ -104,11 +101,11 @@ class Isolation:
     """Settings of FMUs in separate processes.
 
     Attributes:
-        step_timeout: limit of one call of an FMU [s].
+        step_timeout: limit of one call of an FMU [s], which may fetch a licence or read maps first.
 
     """
 
-    step_timeout: float = STEP_TIMEOUT
+    step_timeout: float = 60.0
 
     @classmethod
     def of(cls, isolate: bool, step_timeout: float | None) -> Isolation | None:

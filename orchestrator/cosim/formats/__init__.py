@@ -1,1 +1,1 @@
-"""How systems, runs and settings are written down: SSP, OSP; tables; TOML schemas."""
+"""File formats of systems: SSP and OSP."""

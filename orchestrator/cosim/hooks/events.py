@@ -23,14 +23,6 @@ from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.values import Value, same
 from orchestrator.machine.texts import literal
 
-#: Comparisons, as a scenario writes them.
-COMPARISONS: Mapping[str, Callable[[Any, float], bool]] = {
-    "<=": operator.le,
-    ">=": operator.ge,
-    "<": operator.lt,
-    ">": operator.gt,
-}
-
 #: How often the same event is listed: a condition may chatter for ever.
 MOST_LISTED = 1000
 
@@ -39,7 +31,13 @@ MOST_LISTED = 1000
 class Condition:
     """A signal, as the row shows it, compared with a number."""
 
-    COMPARISONS: ClassVar = COMPARISONS
+    #: Comparisons, as a scenario writes them.
+    COMPARISONS: ClassVar[Mapping[str, Callable[[Any, float], bool]]] = {
+        "<=": operator.le,
+        ">=": operator.ge,
+        "<": operator.lt,
+        ">": operator.gt,
+    }
 
     signal: PortName
     comparison: str
@@ -47,7 +45,7 @@ class Condition:
 
     def holds(self, row: Row) -> bool:
         """Whether it is true of a row."""
-        return COMPARISONS[self.comparison](row.value(self.signal), self.value)
+        return self.COMPARISONS[self.comparison](row.value(self.signal), self.value)
 
     def __str__(self) -> str:
         """As a scenario writes it."""

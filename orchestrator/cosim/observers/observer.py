@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from orchestrator.cosim.experiment import ROUNDING, Experiment
+from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.values import Standing, as_float32
 from orchestrator.machine.errors import InputError, unforeseen
@@ -235,7 +235,7 @@ class Every:
         """Which of some further times are chosen, as truth values."""
         # A time is rounded to the digits that it has, however short the run.
         elapsed = times - self._start + np.spacing(np.abs(times))
-        counts = np.floor(elapsed / self._interval * (1.0 + ROUNDING))
+        counts = np.floor(elapsed / self._interval * (1.0 + Experiment.ROUNDING))
         grown: np.ndarray = np.diff(counts, prepend=self._count) > 0.0
         self._count = float(counts[-1])
         return grown

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.experiment import MOST_STEPS, ROUNDING, Order
+from orchestrator.cosim.experiment import MOST_STEPS, Experiment, Order
 from orchestrator.cosim.system.component import Component
 from orchestrator.cosim.system.connection import Connection, can_feed, check_connection
 from orchestrator.cosim.system.graph import in_levels, opened, strongly_connected, without_rings
@@ -532,7 +532,7 @@ class System:
             if not (number and isfinite(own) and own > 0.0):
                 raise InputError(f"step of {name} {own!r}: must be a positive number of seconds")
             n = max(round(min(own / step, MOST_STEPS + 1.0)), 1)
-            if abs(own / step - n) > ROUNDING * n:
+            if abs(own / step - n) > Experiment.ROUNDING * n:
                 raise InputError(
                     f"{name} needs steps of {own:g} s, which are not a multiple of the "
                     f"communication step of {step:g} s"
