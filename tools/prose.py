@@ -1,14 +1,14 @@
-"""Check the English of the pages: words to avoid, and how long the sentences are.
+"""Check the English of pages and of code: words to avoid, openings, lengths of sentences.
 
-`python tools/prose.py` reads all pages, the Markdown of notebooks, the docstrings of the public
-names of `orchestrator`, the messages in its code and the text of the live page.
-`python tools/prose.py PATH...` reads some pages, or all in a folder. It prints a line for each
-finding, with the words to write instead. Then it prints the lengths of the sentences of each page,
-in words. It fails if there is a finding, or an average above 20 words.
+`python tools/prose.py` reads all pages, the Markdown of notebooks, the text of the live page, and
+the docstrings, comments, messages and test names of all code. `python tools/prose.py PATH...` reads
+some files, or all in a folder. It prints a line for each finding, with the words to write instead.
+Then it prints the lengths of the sentences of each page, in words. It fails if there is a finding,
+or an average above 20 words.
 
 The words are in `tools/prose.toml`; others come from proselint, which the extra `dev` installs.
-Code, the targets of links and comments are not read. Lengths are of whole sentences in paragraphs
-and lists; headings, cells of tables and other items of lists are read for their words only.
+Code within texts and the targets of links are not read. Lengths are of whole sentences in
+paragraphs and lists of pages; everything else is read for its words only.
 """
 
 from __future__ import annotations
@@ -18,11 +18,13 @@ import ast
 import json
 import re
 import sys
+import tokenize
 import tomllib
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from functools import cache
-from inspect import getdoc
+from inspect import cleandoc
+from io import StringIO
 from itertools import accumulate
 from pathlib import Path
 from statistics import mean
@@ -35,15 +37,14 @@ from proselint.config import DEFAULT
 from proselint.registry import CheckRegistry
 from proselint.tools import LintFile
 
-import orchestrator
-
 ROOT = Path(__file__).parents[1]
 
 #: The words to avoid.
 WORDS = Path(__file__).with_suffix(".toml")
 
-#: The live page, without its script.
-LIVE_PAGE = ROOT / "orchestrator" / "live" / "web" / "page.html"
+#: Folders of code, and those in which texts are read that a user may see.
+CODE = ("benchmarks", "examples", "fmus", "orchestrator", "src", "tests", "tools")
+PRODUCT = ("fmus", "orchestrator", "src")
 
 #: How many words the sentences of a page have at most, on average.
 LIMIT = 20
@@ -70,12 +71,34 @@ _ABBREVIATION = re.compile(
 )
 
 
+#: What a docstring holds that is no prose: code in backquotes, and examples.
+_INLINE = re.compile(
+    r"(?::\w+:)?``?[^`]+``?(?:__?)?|^ *>>> .*$|^( +)\.\. math::.*\n(?:\1 +.*\n|\n)*", re.M
+)
+_INDENTED = re.compile(
+    r"(?<=::\n)(?:\n| {4}.*(?:\n|\Z))+|(?:(?<=\n\n) {4}.*(?:\n|\Z))(?: {4}.*(?:\n|\Z)|\n)*"
+)
+
+#: Comments that are orders to tools.
+_ORDER = re.compile(r"!|fmt:|noqa|type:|pragma|mypy:|clang-format|eslint|@ts-|prettier")
+
+#: Comments in C and in TypeScript; strings are found so that nothing in them is one.
+_C_COMMENT = re.compile(
+    r'"(?:\\.|[^"\\\n])*"|/\*(?P<block>.*?)\*/|(?<!:)//(?P<line>[^\n]*(?:\n[ \t]*//[^\n]*)*)', re.S
+)
+
+
 class Block(NamedTuple):
-    """A paragraph, heading, item, cell or message: its first line, and whether it is sentences."""
+    """A paragraph, heading, item, cell, docstring, comment or message."""
 
     line: int
     text: str
+    #: Whether its sentences are counted.
     is_prose: bool
+    #: Whether it describes a piece of code.
+    is_inside: bool = False
+    #: Whether it is a value in code, which may be shown to a user.
+    is_message: bool = False
 
 
 class Page(NamedTuple):
@@ -86,11 +109,13 @@ class Page(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """Words to avoid, what to write instead, and within what they are right."""
+    """Words to avoid, words to write instead, and texts within which they are right."""
 
     find: re.Pattern[str]
     write: str
     unless: re.Pattern[str] | None
+    #: Whether they are avoided as the first words of docstrings and comments only.
+    opens: bool
 
     def spans(self, text: str) -> Iterator[tuple[int, int]]:
         """Where a text has the words: from, to."""
@@ -101,43 +126,35 @@ class Rule(NamedTuple):
 
 
 def pages(paths: Sequence[Path]) -> Iterator[Page]:
-    """The pages among some files and folders."""
+    """Yield the pages and modules among some files and folders."""
     for path in paths:
-        files = sorted([*path.rglob("*.md"), *path.rglob("*.ipynb")]) if path.is_dir() else [path]
-        for file in files:
-            text = file.read_text(encoding="utf-8")
-            blocks = notebook_blocks(text) if file.suffix == ".ipynb" else markdown_blocks(text)
-            name = file.relative_to(ROOT) if file.is_relative_to(ROOT) else file
-            yield Page(name.as_posix(), list(blocks))
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if (read := READERS.get(file.suffix)) and not _FOREIGN.intersection(file.parts):
+                name = file.relative_to(ROOT) if file.is_relative_to(ROOT) else file
+                blocks = read(file.read_text(encoding="utf-8"))
+                is_product = name.parts[0] in PRODUCT
+                yield Page(name.as_posix(), [b for b in blocks if is_product or not b.is_message])
 
 
 def all_pages() -> Iterator[Page]:
-    """All pages of the repository, the interface in Python, and the messages of the program."""
-    yield from pages([*sorted(ROOT.glob("*.md")), ROOT / "docs"])
-    for name in orchestrator.__all__:
-        shown = getattr(orchestrator, name)
-        members = vars(shown).items() if isinstance(shown, type) else ()
-        texts = [shown, *(member for key, member in members if not key.startswith("_"))]
-        blocks = [Block(1, getdoc(text) or "", False) for text in texts]
-        yield Page(f"orchestrator.{name}", blocks)
-    for file in sorted(ROOT.glob("orchestrator/**/*.py")):
-        blocks = list(message_blocks(file.read_text(encoding="utf-8")))
-        yield Page(file.relative_to(ROOT).as_posix(), blocks)
-    blocks = list(html_blocks(LIVE_PAGE.read_text(encoding="utf-8")))
-    yield Page(LIVE_PAGE.relative_to(ROOT).as_posix(), blocks)
+    """Yield all pages and modules of the repository."""
+    yield from pages(sorted(ROOT.glob("*.md")))
+    yield from pages([ROOT / folder for folder in ("docs", *CODE)])
 
 
 def html_blocks(text: str) -> Iterator[Block]:
-    """The texts between the tags of a page."""
+    """Yield the texts between the tags of a page."""
     for between in re.finditer(r">([^<>]*\w\s+\w[^<>]*)<", text):
         yield Block(1 + text.count("\n", 0, between.start(1)), between[1], False)
 
 
-def message_blocks(text: str) -> Iterator[Block]:
-    """The texts in a module that a user may read: errors, help, labels, and not docstrings."""
+def python_blocks(text: str) -> Iterator[Block]:
+    """Yield the docstrings, comments, messages and names of tests of a module."""
     tree = ast.parse(text)
     hidden = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
     for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
+            yield Block(node.lineno, node.name.removeprefix("test_").replace("_", " "), False)
         if isinstance(node, ast.JoinedStr):
             hidden |= set(map(id, node.values))
             words = "".join(
@@ -145,10 +162,51 @@ def message_blocks(text: str) -> Iterator[Block]:
             )
         elif isinstance(node, ast.Constant) and id(node) not in hidden:
             words = str(node.value)
+        elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            if isinstance(node.value.value, str):
+                yield Block(node.lineno, without_code(node.value.value), False, is_inside=True)
+            continue
         else:
             continue
         if " " in words:
-            yield Block(node.lineno, words, False)
+            yield Block(node.lineno, words, False, is_message=True)
+    yield from comment_blocks(text)
+
+
+def comment_blocks(text: str) -> Iterator[Block]:
+    """Yield the comments of a module, those on lines that follow each other as one."""
+    line, words = 0, ""
+    for token in tokenize.generate_tokens(StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            written = token.string.lstrip("#: ")
+            follows = words and token.start[0] == line + 1 + words.count("\n")
+            if follows and token.line.lstrip().startswith("#"):
+                words += f"\n{written}"
+                continue
+            if words and not _ORDER.match(words):
+                yield Block(line, without_code(words), False, is_inside=True)
+            line, words = token.start[0], written
+    if words and not _ORDER.match(words):
+        yield Block(line, without_code(words), False, is_inside=True)
+
+
+def c_blocks(text: str) -> Iterator[Block]:
+    """Yield the comments of a file in C or TypeScript."""
+    for found in _C_COMMENT.finditer(text):
+        words = found["block"] or found["line"]
+        if words and not _ORDER.match(words.strip()):
+            words = re.sub(r"(?m)^[ \t]*(?://|\*+(?!/))?[ \t]?", "", words)
+            line = 1 + text.count("\n", 0, found.start())
+            yield Block(line, without_code(words.lstrip("*! \t")), False, is_inside=True)
+
+
+def without_code(text: str) -> str:
+    """Return a docstring in which code is a sign, on the same lines."""
+    first, *rest = text.split("\n", 1)
+    text = "\n".join([first, *(cleandoc(f"\n.\n{rest[0]}").split("\n", 1)[1:] if rest else [])])
+    for code in (_INDENTED, _INLINE):
+        text = code.sub(lambda match: _CODE + "\n" * match[0].count("\n"), text)
+    return text
 
 
 def notebook_blocks(text: str) -> Iterator[Block]:
@@ -210,6 +268,7 @@ def rules() -> Sequence[Rule]:
             pattern(rf"(?<!\w)(?:{rule['find']})(?!\w)"),
             rule["write"],
             pattern("|".join(rule["unless"])) if "unless" in rule else None,
+            rule.get("opens", False),
         )
         for rule in tomllib.loads(WORDS.read_text(encoding="utf-8"))["rule"]
     ]
@@ -224,7 +283,11 @@ def findings(page: Page) -> Iterator[str]:
     """A line for each place of a page where something else should be written."""
     text = _BETWEEN.join(block.text for block in page.blocks)
     begins = [0, *accumulate(len(block.text) + len(_BETWEEN) for block in page.blocks)]
-    found = [(*span, rule.write) for rule in rules() for span in rule.spans(text)]
+    found = [(*span, rule.write) for rule in rules() if not rule.opens for span in rule.spans(text)]
+    for rule in (rule for rule in rules() if rule.opens):
+        for begin, block in zip(begins, page.blocks, strict=False):
+            if block.is_inside and (match := rule.find.match(text, begin)):
+                found.append((*match.span(), rule.write))
     for begin, end, write in sorted([*found, *library_findings(text)]):
         number = bisect_right(begins, begin) - 1
         block = page.blocks[number]
@@ -243,8 +306,9 @@ def library_findings(text: str) -> Iterator[tuple[int, int, str]]:
     for result in LintFile("text", f"{text}\n").lint({**DEFAULT, "checks": selected}):
         # It puts a line in front.
         begin, end = (place - 1 for place in result.check_result.span)
-        # It finds "for ever" in "for every".
-        if not text[end - 1 : end + 1].isalpha():
+        # It finds "for ever" in "for every", and numbers and symbols that occur twice.
+        is_word = not text[end - 1 : end + 1].isalpha()
+        if is_word and not re.fullmatch(r"(?:\w|[\d.]+)\s+(?:\w|[\d.]+)", text[begin:end]):
             yield begin, end, result.check_result.message
 
 
@@ -254,6 +318,19 @@ def quotation(text: str, begin: int, end: int) -> str:
     after = re.match(r"\S*(?:\s+\S+){0,4}", text[end:])
     assert before and after
     return " ".join(f"{before.group()}{text[begin:end]}{after.group()}".split())
+
+
+#: How a kind of file is read, and folders in which nothing is read.
+READERS = {
+    ".md": markdown_blocks,
+    ".ipynb": notebook_blocks,
+    ".html": html_blocks,
+    ".py": python_blocks,
+    ".c": c_blocks,
+    ".h": c_blocks,
+    ".ts": c_blocks,
+}
+_FOREIGN = {"node_modules", "__pycache__"}
 
 
 def main() -> int:

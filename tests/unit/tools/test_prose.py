@@ -9,14 +9,16 @@ import pytest
 pytest.importorskip("proselint")
 
 from prose import (
+    Block,
     Page,
+    c_blocks,
     findings,
     html_blocks,
     length,
     markdown_blocks,
-    message_blocks,
     notebook_blocks,
     pages,
+    python_blocks,
     rules,
     sentences,
 )
@@ -113,12 +115,42 @@ def test_a_notebook_is_read_by_the_lines_of_its_file():
     assert text.splitlines()[sentence.line - 1].strip() == '"A sentence."'
 
 
-def test_messages_of_a_module_are_read_and_docstrings_are_not():
-    text = '"""What a module is."""\n\nsay("the file", f"{name} is not\\n{there!r} yet", "x", 3)\n'
-    assert [(block.line, block.text) for block in message_blocks(text)] == [
-        (3, "the file"),
-        (3, "`…` is not\n`…` yet"),
+def test_docstrings_comments_messages_and_test_names_of_a_module_are_read():
+    text = (
+        '"""A module.\n\nText::\n\n    what = 1\n\n``what`` is\nread."""\n\n'
+        "#: A constant\n#: on two lines.\n"
+        'say("the file", f"{name} is not\\n{there!r} yet", "x", 3)  # noqa: what\n'
+        "def test_a_name(): ...  # Beside\n"
+    )
+    blocks = sorted(python_blocks(text))
+    assert [(b.line, b.text.split("\n")[-1]) for b in blocks if b.is_inside] == [
+        (1, "read."),
+        (10, "on two lines."),
+        (13, "Beside"),
     ]
+    assert [(b.line, b.text) for b in blocks if b.is_message] == [
+        (12, "`…` is not\n`…` yet"),
+        (12, "the file"),
+    ]
+    assert [b.text for b in blocks if not b.is_inside and not b.is_message] == ["a name"]
+    assert "what" not in "".join(block.text for block in blocks)
+
+
+def test_comments_in_c_are_read():
+    text = '/* What a file\n * holds. */\nchar *s = "// no"; // One\n// comment.\nx = 1; // noqa\n'
+    assert [(b.line, b.text.split("\n")[-1].strip()) for b in c_blocks(text)] == [
+        (1, "holds."),
+        (3, "comment."),
+    ]
+
+
+@pytest.mark.parametrize("opening", ["What a row holds.", "Whether it ends.", "Have it end."])
+def test_an_opening_is_found_in_docstrings_and_comments_only(opening: str):
+    [finding] = findings(Page("x.py", [Block(2, opening, False, is_inside=True)]))
+    assert finding.startswith("x.py:2: ")
+    assert not list(findings(Page("x.md", [Block(2, opening, True)])))
+    inside = Block(2, f"A row: {opening}", False, is_inside=True)
+    assert not list(findings(Page("x.py", [inside])))
 
 
 def test_texts_between_tags_are_read_with_their_lines():
