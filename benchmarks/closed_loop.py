@@ -32,7 +32,7 @@ from fmus.python.component import Component
 from fmus.python.state import STEPPING
 from orchestrator.cosim import Experiment, Stepping, System, choose_loop
 from orchestrator.cosim.fmi.instance import Instance
-from orchestrator.cosim.fmi.slaves import FMU2OfOthers
+from orchestrator.cosim.fmi.loaded import FMU2OfOthers
 from orchestrator.cosim.stages import Member
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired

@@ -34,8 +34,8 @@ from orchestrator.cosim import (
     make_plan,
     simulate_plan,
 )
-from orchestrator.cosim.hooks.hook import NEVER
-from orchestrator.cosim.observers.files import CsvFile
+from orchestrator.cosim.hooks import NEVER
+from orchestrator.cosim.observers import CsvFile
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile

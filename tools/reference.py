@@ -38,8 +38,8 @@ from orchestrator.cosim import (
     read_component,
     simulate_to_end,
 )
-from orchestrator.cosim.formats.ssp.writer import parameter_set_xml
-from orchestrator.cosim.observers.files import CsvFile
+from orchestrator.cosim.formats.ssp_writer import parameter_set_xml
+from orchestrator.cosim.observers import CsvFile
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.own_components import build_own

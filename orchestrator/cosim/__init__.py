@@ -31,22 +31,10 @@ from typing import TYPE_CHECKING
 from orchestrator.machine.lazy import offered
 
 if TYPE_CHECKING:
-    from orchestrator.cosim.experiment import (
-        INITIAL,
-        CouplingName,
-        Exchange,
-        Experiment,
-        Order,
-        OrderName,
-    )
-    from orchestrator.cosim.fmi.binary import binary_of, check_binary, runs_python
-    from orchestrator.cosim.fmi.isolated import Isolation
-    from orchestrator.cosim.formats.osp import read_osp, write_osp
-    from orchestrator.cosim.formats.ssp.archive import read_document
-    from orchestrator.cosim.formats.ssp.reader import bind_parameter_set, read_ssp
-    from orchestrator.cosim.formats.ssp.writer import PARAMETER_SET, ssp_bytes, write_ssp
-    from orchestrator.cosim.hooks.checkpoint import Checkpoints
-    from orchestrator.cosim.hooks.events import (
+    from orchestrator.cosim.checkpoint import Checkpoints
+    from orchestrator.cosim.component import Component, read_component
+    from orchestrator.cosim.connection import Connection, Linear, Mapped, PortName, join_terminals
+    from orchestrator.cosim.events import (
         Action,
         Alter,
         Condition,
@@ -58,31 +46,41 @@ if TYPE_CHECKING:
         Set,
         Stop,
     )
-    from orchestrator.cosim.hooks.hook import Hook, Run
-    from orchestrator.cosim.hooks.timing import InputTable, Playback, RealTime
+    from orchestrator.cosim.experiment import (
+        INITIAL,
+        CouplingName,
+        Exchange,
+        Experiment,
+        Order,
+        OrderName,
+    )
+    from orchestrator.cosim.fmi.binary import binary_of, check_binary, runs_python
+    from orchestrator.cosim.fmi.isolated import Isolation
+    from orchestrator.cosim.formats.archive import read_document
+    from orchestrator.cosim.formats.osp import read_osp, write_osp
+    from orchestrator.cosim.formats.ssp_reader import bind_parameter_set, read_ssp
+    from orchestrator.cosim.formats.ssp_writer import PARAMETER_SET, ssp_bytes, write_ssp
+    from orchestrator.cosim.hooks import Hook, InputTable, Playback, RealTime, Run
     from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, LoopName, Stepping, choose_loop
-    from orchestrator.cosim.observers.files import TABLE_FORMATS, CsvLines, TableFormat
-    from orchestrator.cosim.observers.observer import (
+    from orchestrator.cosim.observers import (
+        TABLE_FORMATS,
+        CsvLines,
         Ending,
         Header,
         Observer,
         Occurrence,
         Progress,
         Selection,
+        Table,
+        TableFormat,
         every,
     )
-    from orchestrator.cosim.observers.table import Table
     from orchestrator.cosim.plan import Plan, make_plan
     from orchestrator.cosim.row import FACTOR, OFFSET
     from orchestrator.cosim.simulation import simulate_plan, simulate_to_end
     from orchestrator.cosim.stages import Stage, Stages, Visit, stages_of, types_read
-    from orchestrator.cosim.system.component import Component, read_component
-    from orchestrator.cosim.system.connection import Connection, join_terminals
-    from orchestrator.cosim.system.names import PortName
-    from orchestrator.cosim.system.structure import System
-    from orchestrator.cosim.system.units import Linear, Mapped
-    from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value
-    from orchestrator.cosim.system.variables import Variable
+    from orchestrator.cosim.system import System
+    from orchestrator.cosim.variables import TYPES, Standing, StringTable, Value, Variable
 
 __all__ = [
     "FACTOR",
@@ -168,27 +166,22 @@ __getattr__, __dir__ = offered(
         "fmi.binary": "binary_of check_binary runs_python",
         "fmi.isolated": "Isolation",
         "formats.osp": "read_osp write_osp",
-        "formats.ssp.archive": "read_document",
-        "formats.ssp.reader": "bind_parameter_set read_ssp",
-        "formats.ssp.writer": "PARAMETER_SET ssp_bytes write_ssp",
-        "hooks.checkpoint": "Checkpoints",
-        "hooks.events": "Action Alter Condition Event Events Freeze Release Reset Set Stop",
-        "hooks.hook": "Hook Run",
-        "hooks.timing": "InputTable Playback RealTime",
+        "formats.archive": "read_document",
+        "formats.ssp_reader": "bind_parameter_set read_ssp",
+        "formats.ssp_writer": "PARAMETER_SET ssp_bytes write_ssp",
+        "checkpoint": "Checkpoints",
+        "events": "Action Alter Condition Event Events Freeze Release Reset Set Stop",
+        "hooks": "Hook InputTable Playback RealTime Run",
         "loop": "LOOPS LoopName PYTHON_LOOP Stepping choose_loop",
-        "observers.files": "CsvLines TABLE_FORMATS TableFormat",
-        "observers.observer": "Ending Header Observer Occurrence Progress Selection every",
-        "observers.table": "Table",
+        "observers": "CsvLines Ending Header Observer Occurrence Progress Selection TABLE_FORMATS "
+        "Table TableFormat every",
         "plan": "Plan make_plan",
         "row": "FACTOR OFFSET",
         "simulation": "simulate_plan simulate_to_end",
         "stages": "Stage Stages Visit stages_of types_read",
-        "system.component": "Component read_component",
-        "system.connection": "Connection join_terminals",
-        "system.names": "PortName",
-        "system.structure": "System",
-        "system.units": "Linear Mapped",
-        "system.values": "Standing StringTable TYPES Value",
-        "system.variables": "Variable",
+        "component": "Component read_component",
+        "connection": "Connection Linear Mapped PortName join_terminals",
+        "system": "System",
+        "variables": "Standing StringTable TYPES Value Variable",
     },
 )

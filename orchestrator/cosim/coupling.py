@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from ctypes import c_double
 from dataclasses import replace
 
+from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.experiment import (
     DELAY,
     FEEDTHROUGH,
@@ -34,8 +35,7 @@ from orchestrator.cosim.stages import (
     stages_of,
     step_members,
 )
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError, StartError, shortened
 
 #: Values go along all connections so often, until they rest.

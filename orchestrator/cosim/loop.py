@@ -16,11 +16,10 @@ import numpy as np
 from fmpy import platform_tuple
 
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.fmi.instance import CALLS
+from orchestrator.cosim.fmi.instance import CALLS, CMember, CMove
 from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.fmi.transfer import CMember, CMove
-from orchestrator.cosim.hooks.hook import Run
-from orchestrator.cosim.observers.observer import CBlock
+from orchestrator.cosim.hooks import Run
+from orchestrator.cosim.observers import CBlock
 from orchestrator.cosim.stages import Decimation, LinkedStage, Member, make_stages
 from orchestrator.machine.cache import users_folder
 from orchestrator.machine.compilers import (

@@ -10,7 +10,7 @@ from platform import python_version
 
 from orchestrator.cosim.experiment import FEEDTHROUGH, LINEAR, Experiment
 from orchestrator.cosim.stages import Arrangement, arrange
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import PACKAGES, Identity, code_of
 

@@ -14,13 +14,12 @@ from math import inf
 
 import numpy as np
 
+from orchestrator.cosim.component import Component
+from orchestrator.cosim.connection import Connection, PortName
 from orchestrator.cosim.fmi.instance import ComponentFailed, Instance
 from orchestrator.cosim.row import Gathering, Row
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.variables import Variable
+from orchestrator.cosim.system import System
+from orchestrator.cosim.variables import Variable
 from orchestrator.machine.errors import shortened
 from orchestrator.machine.texts import real
 

@@ -8,14 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from orchestrator.cosim.component import Component
+from orchestrator.cosim.connection import Connection, Linear, Mapped, PortName
 from orchestrator.cosim.fmi.instance import Instance, Part
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped
-from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value, are_of
-from orchestrator.cosim.system.variables import Variable, references_of
+from orchestrator.cosim.system import System
+from orchestrator.cosim.variables import (
+    TYPES,
+    Standing,
+    StringTable,
+    Value,
+    Variable,
+    are_of,
+    references_of,
+)
 
 #: A change so small, or so small a share of the value, is a rounding error.
 _ROUNDING = 1e-12

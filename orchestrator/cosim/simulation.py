@@ -8,19 +8,19 @@ from time import monotonic
 
 import numpy as np
 
+from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.coupling import Coupling
 from orchestrator.cosim.experiment import OURS, Exchange
 from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Instance, Log
 from orchestrator.cosim.fmi.isolated import Isolation, place_instances
 from orchestrator.cosim.fmi.surroundings import Surroundings, default_mode
-from orchestrator.cosim.hooks.hook import Hook, Hooks, Run
+from orchestrator.cosim.hooks import Hook, Hooks, Run
 from orchestrator.cosim.loop import PYTHON_LOOP, Stepping
-from orchestrator.cosim.observers.observer import Blocks, Ending, Header, NotKept, Observer
+from orchestrator.cosim.observers import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.cosim.plan import Plan
 from orchestrator.cosim.row import Overrides, Row
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import same
+from orchestrator.cosim.system import System
+from orchestrator.cosim.variables import same
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.machine.texts import literal

@@ -39,17 +39,24 @@ from typing import ClassVar, Generic, Literal, NamedTuple, TypeAlias, TypeVar, g
 import numpy as np
 from fmpy.fmi2 import fmi2Error, fmi2OK, fmi2Warning
 
+from orchestrator.cosim.component import Component
+from orchestrator.cosim.connection import Connection, PortName
 from orchestrator.cosim.experiment import FEEDTHROUGH, JACOBI, Experiment, Order
-from orchestrator.cosim.fmi.instance import DO_STEP, GET_OUTPUTS, SET_INPUTS, Instance
+from orchestrator.cosim.fmi.instance import (
+    DO_STEP,
+    GET_OUTPUTS,
+    SET_INPUTS,
+    CMember,
+    CMove,
+    DoStepCallback,
+    Instance,
+    address_of,
+)
 from orchestrator.cosim.fmi.surroundings import PRODUCT, A, B, C, restore_mode
-from orchestrator.cosim.fmi.transfer import CMember, CMove, DoStepCallback, address_of
 from orchestrator.cosim.ring import Ring
 from orchestrator.cosim.row import Gathering, Row
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import TYPES
+from orchestrator.cosim.system import System
+from orchestrator.cosim.variables import TYPES
 from orchestrator.machine.errors import shortened
 
 #: By names or as calls.

@@ -1,4 +1,4 @@
-/* What happens to a run from outside, between two steps: see orchestrator/cosim/hooks/events.py.
+/* What happens to a run from outside, between two steps: see orchestrator/cosim/events.py.
  *
  * The host gives what is to happen as numbers, with zeros where this keeps how far it has come.
  * Several events may act on one input or parameter: the latest counts, and when it ends, the one

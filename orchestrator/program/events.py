@@ -1,6 +1,6 @@
 """Events of a program: the part of its text that they need.
 
-Between two steps, `events.c` does what :mod:`orchestrator.cosim.hooks.events` does. It knows
+Between two steps, `events.c` does what :mod:`orchestrator.cosim.events` does. It knows
 numbers only: what happened is put into words by the page.
 """
 

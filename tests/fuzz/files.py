@@ -39,7 +39,7 @@ import numpy as np
 from orchestrator import Result, simulate
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.cosim import Experiment, Linear, Mapped, Observer, Plan, Table, ssp_bytes
-from orchestrator.cosim.observers.files import CsvFile
+from orchestrator.cosim.observers import CsvFile
 from orchestrator.exchange import verify
 from orchestrator.machine import user_files
 from orchestrator.machine.disk import _process_folder

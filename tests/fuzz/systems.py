@@ -66,7 +66,7 @@ from orchestrator.cosim import (
     read_component,
     simulate_plan,
 )
-from orchestrator.cosim.system.connection import can_feed
+from orchestrator.cosim.connection import can_feed
 from orchestrator.live import module
 from orchestrator.live.module import MODULE
 from orchestrator.live.programs import OF_PROGRAM, Source

@@ -19,7 +19,7 @@ from orchestrator.cosim import (
     make_plan,
     simulate_plan,
 )
-from orchestrator.cosim.observers.files import CsvFile
+from orchestrator.cosim.observers import CsvFile
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, prepare_request, with_companion
 from orchestrator.runs.request import Request

@@ -14,7 +14,7 @@ import pytest
 from orchestrator.commands import check
 from orchestrator.commands.main import main
 from orchestrator.cosim import Connection, PortName, System, read_component, write_ssp
-from orchestrator.cosim.formats.ssp import STRUCTURE
+from orchestrator.cosim.formats.archive import STRUCTURE
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
 from orchestrator.runs.preparation import prepare

@@ -13,8 +13,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim import Checkpoints, Ending, Run, System, write_ssp
-from orchestrator.cosim.hooks import checkpoint
+from orchestrator.cosim import Checkpoints, Ending, Run, System, checkpoint, write_ssp
 from orchestrator.runs.bundle import current_fmus
 from support import others, typed
 from support.fleets import fleet_of

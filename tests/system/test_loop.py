@@ -32,7 +32,7 @@ from orchestrator.cosim import (
     simulate_plan,
 )
 from orchestrator.cosim.fmi.instance import Ended
-from orchestrator.cosim.hooks.hook import NEVER
+from orchestrator.cosim.hooks import NEVER
 from orchestrator.machine.errors import StartError
 from orchestrator.runs.loading import load
 from orchestrator.runs.wiring import closed_loop
@@ -90,7 +90,7 @@ def same(system: System, experiment: Experiment, events: Sequence[Event] = ()) -
 def test_random_systems_give_the_same_rows_and_the_same_failures(
     folder, arguments, step, n, rest, order, rows
 ):
-    with patch("orchestrator.cosim.observers.observer._ROWS", rows):
+    with patch("orchestrator.cosim.observers._ROWS", rows):
         same(system_of(folder, **arguments), Experiment((n + rest) * step, step, order))
 
 

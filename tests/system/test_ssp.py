@@ -11,7 +11,7 @@ from fmpy.ssp.simulation import simulate_ssp
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim import write_ssp
-from orchestrator.cosim.formats.ssp.writer import structure_xml
+from orchestrator.cosim.formats.ssp_writer import structure_xml
 from orchestrator.machine.errors import InputError
 from support.archives import (
     archive,

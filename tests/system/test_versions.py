@@ -22,7 +22,7 @@ from orchestrator.cosim import (
     make_plan,
     simulate_plan,
 )
-from orchestrator.cosim.observers.files import CsvFile, ParquetFile
+from orchestrator.cosim.observers import CsvFile, ParquetFile
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_events
 from support import others, typed

@@ -1,4 +1,4 @@
-"""The library of an FMU: brought along or compiled from C sources, and loaded once a process."""
+"""The binary of an FMU for this machine: brought along, or compiled from its C sources."""
 
 from __future__ import annotations
 
@@ -8,21 +8,15 @@ import re
 import struct
 import sysconfig
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from hashlib import sha256
 from pathlib import Path
-from shutil import copytree
-from tempfile import mkdtemp
-from threading import Lock
 from typing import Any, NamedTuple
 
 import fmpy
 from fmpy.model_description import read_build_description
 
-from orchestrator.cosim.fmi.slaves import slave_class
-from orchestrator.cosim.fmi.surroundings import restore_mode, within_folder
-from orchestrator.cosim.system.component import Component
+from orchestrator.cosim.component import Component
 from orchestrator.machine import cache
 from orchestrator.machine.compilers import compile_library, find_compiler
 from orchestrator.machine.disk import hold_lock
@@ -48,54 +42,6 @@ _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 #: Category of compiled libraries in the cache.
 _CATEGORY = "sources"
-
-#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
-_libraries: dict[Path, Library] = {}
-_LOCK = Lock()
-
-
-class Library:
-    """A loaded FMU, which serves all its instances in this process.
-
-    Attributes:
-        fmu: fmpy's view of it.
-        corrupted: whether one of them has ended with status fatal: FMI then forbids every further
-            call, also for the others, even to free them.
-        runs_python: whether PythonFMU has made it.
-        is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
-            instance.
-        users: how many there are.
-
-    """
-
-    def __init__(self, component: Component, folder: Path) -> None:
-        """Load an FMU that has been unpacked into a folder.
-
-        Raises:
-            InputError: it cannot be loaded.
-
-        """
-        check_place(folder)
-        check_binary(component, folder)
-        make_binary(component, folder)
-        try:
-            # fmpy changes the current folder meanwhile, and leaves it so if it fails.
-            with within_folder(folder):
-                self.fmu = slave_class(component)(
-                    guid=component.description.guid,
-                    modelIdentifier=component.description.coSimulation.modelIdentifier,
-                    unzipDirectory=str(folder),
-                    libraryPath=str(binary_of(component, folder)),
-                )
-        except Exception as error:
-            raise InputError(
-                f"{name_with_fmu(component)} cannot be loaded: {reason(error)}"
-            ) from error
-        finally:
-            restore_mode()
-        self.runs_python = runs_python(folder)
-        self.is_akin = component.is_ours or self.runs_python
-        self.corrupted, self.users = False, 0
 
 
 def name_with_fmu(component: Component) -> str:
@@ -144,8 +90,8 @@ def binary_of(component: Component, folder: Path) -> Path:
 
 def _platform(component: Component) -> str:
     """The name of the folder of this machine's libraries in the FMU's version."""
-    platform: str = slave_class(component).platform
-    return platform
+    is_newest = component.description.fmiMajorVersion == 3
+    return str(fmpy.platform_tuple if is_newest else fmpy.platform)
 
 
 def make_binary(component: Component, folder: Path) -> None:
@@ -231,43 +177,6 @@ def _is_cut_short(path: Path) -> bool:
             kind, offset, size = struct.unpack_from(order + segment, table, at)
             ends += [offset + size] * (kind == _LOADED)
         return path.stat().st_size < max(ends)
-
-
-@contextmanager
-def library_of(component: Component, folder: Path) -> Iterator[Library]:
-    """The library of an unpacked FMU, for one more instance of it.
-
-    Many libraries hold something of the instances that they have had: each is unloaded with its
-    last one, except the ones that are known not to.
-
-    Raises:
-        InputError: it cannot be loaded.
-
-    """
-    with _LOCK:
-        library = _libraries.get(folder)
-        if library is None:
-            library = Library(component, folder)
-        elif library.corrupted:
-            # It stays loaded, with all that it has in memory; under another name it is a new one.
-            library = Library(component, _copied(folder))
-        _libraries[folder] = library
-        library.users += 1
-    try:
-        yield library
-    finally:
-        with _LOCK:
-            library.users -= 1
-            if not (library.users or library.corrupted or library.is_akin):
-                del _libraries[folder]
-                library.fmu.freeLibrary()
-
-
-def _copied(folder: Path) -> Path:
-    try:
-        return Path(copytree(folder, mkdtemp(dir=folder.parent), dirs_exist_ok=True))
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error
 
 
 class Sources(NamedTuple):

@@ -34,9 +34,11 @@ import numpy as np
 from fmpy.fmi2 import fmi2OK, fmi2Pending, fmi2Warning
 from fmpy.model_description import ModelVariable
 
+from orchestrator.cosim.component import Component, read_description
 from orchestrator.cosim.fmi.binary import make_binary
 from orchestrator.cosim.fmi.instance import (
     MOST_MESSAGES,
+    CMember,
     ComponentFailed,
     Ended,
     Instance,
@@ -45,12 +47,10 @@ from orchestrator.cosim.fmi.instance import (
 )
 from orchestrator.cosim.fmi.loaded import load_instance
 from orchestrator.cosim.fmi.surroundings import Surroundings
-from orchestrator.cosim.fmi.transfer import CMember
 from orchestrator.cosim.row import Row, ports_of_type
 from orchestrator.cosim.stages import member, step_members
-from orchestrator.cosim.system.component import Component, read_description
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.values import TYPES, Standing, StringTable, Value, are_of
+from orchestrator.cosim.system import System
+from orchestrator.cosim.variables import TYPES, Standing, StringTable, Value, are_of
 from orchestrator.machine.errors import (
     InputError,
     StartError,

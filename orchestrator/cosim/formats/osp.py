@@ -8,14 +8,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element, SubElement
 
-from orchestrator.cosim.formats.ssp.archive import Archive
-from orchestrator.cosim.formats.ssp.writer import serialised
-from orchestrator.cosim.system.component import Component, read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, conversion, unit_of_port
-from orchestrator.cosim.system.values import Value
+from orchestrator.cosim.component import Component, read_component
+from orchestrator.cosim.connection import Connection, Linear, PortName, conversion, unit_of_port
+from orchestrator.cosim.formats.archive import Archive
+from orchestrator.cosim.formats.ssp_writer import serialised
+from orchestrator.cosim.system import System
+from orchestrator.cosim.variables import Value
 from orchestrator.machine.errors import Findings, InputError, listed, reason
 from orchestrator.machine.texts import literal
 from orchestrator.machine.user_files import check_file, is_folder, read_archive

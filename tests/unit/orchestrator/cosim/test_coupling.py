@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import fmi2Discard
 
+from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.coupling import Coupling
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.instance import Log
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.row import Row
-from orchestrator.cosim.system.names import PortName
 from orchestrator.machine.errors import InputError, StartError
 from support.static import Static, static_system
 from support.texts import mentions

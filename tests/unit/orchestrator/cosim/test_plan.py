@@ -15,17 +15,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.cosim import plan
+from orchestrator.cosim.component import Component
+from orchestrator.cosim.connection import Linear, PortName
+from orchestrator.cosim.events import Event, Stop
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.hooks.events import Event, Stop
-from orchestrator.cosim.hooks.timing import InputTable
+from orchestrator.cosim.hooks import InputTable
 from orchestrator.cosim.loop import choose_loop
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.stages import arrange, gathered_connections
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear
+from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import digest_of
 from orchestrator.runs.preparation import Prepared
@@ -335,7 +334,7 @@ def test_another_version_is_another_run(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("room", "is_same"), [("system", False), ("cosim", False), ("machine", True), ("runs", True)]
+    ("room", "is_same"), [("fmi", False), ("cosim", False), ("machine", True), ("runs", True)]
 )
 def test_code_is_part_of_a_run_where_it_makes_rows(monkeypatch, room, is_same):
     def commented(path: Path) -> bytes:

@@ -11,11 +11,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from orchestrator.cosim.connection import Linear, PortName
 from orchestrator.cosim.fmi.instance import ComponentFailed
 from orchestrator.cosim.ring import Ring
 from orchestrator.cosim.row import Row
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.units import Linear
 from support.static import Function, Static, static_system
 from support.texts import mentions
 

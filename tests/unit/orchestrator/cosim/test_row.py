@@ -9,12 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from orchestrator.cosim.component import read_component
+from orchestrator.cosim.connection import Connection, Linear, Mapped, PortName
 from orchestrator.cosim.row import Gathering, Overrides, Row
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.connection import Connection
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
-from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.cosim.system import System
 from support.archives import fmu, variable
 from support.texts import mentions
 

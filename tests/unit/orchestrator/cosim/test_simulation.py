@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
+from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.hooks.hook import Run
-from orchestrator.cosim.observers.observer import Ending, Header
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.hooks import Run
+from orchestrator.cosim.observers import Ending, Header, Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan, simulate_to_end
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError
 from support.linear import SINE, Part, linear, system_of
 from support.texts import mentions

@@ -22,7 +22,7 @@ from orchestrator.cosim import (
     Stop,
     Table,
 )
-from orchestrator.cosim.hooks.events import MOST_LISTED, occurrence
+from orchestrator.cosim.events import MOST_LISTED, occurrence
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import Text

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from orchestrator.cosim.component import read_component
+from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.fmi.instance import ComponentFailed, Instance, Log
 from orchestrator.cosim.fmi.isolated import Isolation, place_instances
 from orchestrator.cosim.row import Row
 from orchestrator.cosim.stages import member, step_members
-from orchestrator.cosim.system.component import read_component
-from orchestrator.cosim.system.names import PortName
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system import System
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.runs.wiring import closed_loop
 from support.mixed import Shape, build

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from orchestrator.cosim.component import Component
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi import isolated
 from orchestrator.cosim.fmi.instance import Log
@@ -26,11 +27,10 @@ from orchestrator.cosim.fmi.isolated import (
     Served,
     sizes,
 )
-from orchestrator.cosim.observers.table import Table
+from orchestrator.cosim.observers import Table
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.simulation import simulate_plan
-from orchestrator.cosim.system.component import Component
-from orchestrator.cosim.system.structure import System
+from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.interrupts import Interrupts
 from support.others import build, system_of

@@ -1,0 +1,398 @@
+"""What a run needs to go on in another process, written from time to time.
+
+A folder holds two files. All rows so far are in the one that grows. The other is replaced as a
+whole, once the rows are on the disk: it says how many of them count, with their digest, and holds
+the states of the FMUs and whatever else a run knows, with a checksum over all. A process may be
+killed at any time: what it leaves is its last checkpoint. A random token in both files tells
+them from files of the user's.
+
+Observers have no state there. A run that is resumed tells them all rows again, from the first on,
+so any observer of a run can observe one that was resumed.
+"""
+
+from __future__ import annotations
+
+import os
+from base64 import b64decode, b64encode
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from hashlib import sha256
+from math import isfinite
+from pathlib import Path
+from stat import S_ISREG
+from typing import Any, NamedTuple
+from uuid import uuid4
+
+import numpy as np
+
+from orchestrator.cosim.fmi.instance import Log
+from orchestrator.cosim.hooks import NEVER, Lasting, Run
+from orchestrator.cosim.observers import Ending, Header, NotKept
+from orchestrator.machine.disk import move_aside, sealed, unsealed, write_whole
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.identity import Identity, differences
+from orchestrator.machine.operating_system import sync_to_disk
+
+#: The file that grows, and the one that is replaced.
+_ROWS, _STATE = "rows.bin", "state.json"
+
+#: A number in the file of rows, and how many rows are read at once.
+_NUMBER, _AT_ONCE = np.dtype("<f8"), 4096
+
+#: The first bytes of that file, before a token, and how long both are together.
+_TITLE, _BEGIN = b"auv-fmu rows ", 64
+
+
+def begins(path: Path, token: str) -> bool:
+    """Whether a file of rows bears a token."""
+    if path.is_symlink() or not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(_BEGIN) == _head(token)
+
+
+def _head(token: str) -> bytes:
+    return (_TITLE + token.encode()).ljust(_BEGIN - 1) + b"\n"
+
+
+class RowLog:
+    """A file of rows, number after number, without anything between them.
+
+    Rows that are there after those that count are compared with what comes in their place.
+    """
+
+    def __init__(self, path: Path, token: str, width: int, kept: int = 0, digest: str = "") -> None:
+        """Make the file, or go on after the first rows of one that is there.
+
+        Args:
+            path: of the file.
+            token: that it begins with.
+            width: numbers in a row.
+            kept: how many of its rows count.
+            digest: of these.
+
+        Raises:
+            InputError: they are not there, or not as they were.
+
+        """
+        self._path, self._width, self._kept = path, width, kept
+        self._digest, self._after = sha256(), 0
+        if not kept:
+            self._file = path.open("x+b")
+            self._file.write(_head(token))
+            self._file.flush()
+            return
+        row = width * _NUMBER.itemsize
+        if is_whole := begins(path, token):
+            for rows in self.kept():
+                self._digest.update(rows.astype(_NUMBER, copy=False).tobytes())
+        if not is_whole or self._digest.hexdigest() != digest:
+            raise InputError(
+                f"{path}: missing, damaged, or from another checkpoint; move it and the checkpoint "
+                "next to it, or let --force move both aside"
+            )
+        self._file = path.open("r+b")
+        there = (path.stat().st_size - _BEGIN) // row
+        # A part of a row may follow.
+        self._file.truncate(_BEGIN + there * row)
+        self._file.seek(_BEGIN + kept * row)
+        self._after = there - kept
+
+    def append(self, rows: np.ndarray) -> tuple[int, int] | None:
+        """Write some rows.
+
+        Returns:
+            Row and column of the first number that differs; None: none does.
+
+        """
+        content = rows.astype(_NUMBER, copy=False).tobytes()
+        different = self._different(content) if self._after else None
+        self._file.write(content)
+        self._digest.update(content)
+        if different is None:
+            return None
+        self._after = 0
+        self._file.truncate()
+        return divmod(different, self._width)
+
+    def _different(self, content: bytes) -> int | None:
+        """The index in the file of the first number that differs from the expected one."""
+        place = self._file.tell()
+        there = np.frombuffer(self._file.read(len(content)), np.uint64)
+        self._file.seek(place)
+        # Bit for bit: zero is not minus zero.
+        changed = np.flatnonzero(there != np.frombuffer(content, np.uint64)[: len(there)])
+        self._after -= len(there) // self._width
+        return int(changed[0]) if len(changed) else None
+
+    def kept(self) -> Iterator[np.ndarray]:
+        """The rows that were there before, some thousand at a time."""
+        with self._path.open("rb") as file:
+            file.seek(_BEGIN)
+            for first in range(0, self._kept, _AT_ONCE):
+                n = min(_AT_ONCE, self._kept - first)
+                numbers = np.fromfile(file, _NUMBER, n * self._width)
+                if len(numbers) < n * self._width:
+                    raise InputError(f"{self._path}: holds fewer than {self._kept:,} rows")
+                yield numbers.astype(float, copy=False).reshape(n, self._width)
+
+    def to_disk(self) -> str:
+        """Have all rows outlast the process, and a power cut; their digest is given back."""
+        self._file.flush()
+        sync_to_disk(self._path)
+        return self._digest.hexdigest()
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+
+class _Stored(NamedTuple):
+    """What the file that is replaced holds.
+
+    Attributes:
+        identity: the token of both files, by the name that files on disks have for it.
+        every: for how many seconds a checkpoint was written [s].
+        of: the run.
+        time, made: how far the run had come [s], and in how many steps; None: no row counts yet.
+        n_rows, rows: how many rows count, and the digest of all of them.
+        row: all values, hidden ones too.
+        states: of the FMUs, as base64.
+        lasting: what else there was to remember.
+
+    """
+
+    identity: str
+    every: float
+    of: dict[str, str]
+    time: float | None = None
+    made: int = 0
+    n_rows: int = 0
+    rows: str = ""
+    row: Sequence[float] = ()
+    states: Mapping[str, str] = {}
+    lasting: Sequence[Any] = ()
+
+
+class Checkpoints:
+    """An observer and hook that writes checkpoints, and begins with the one that it finds.
+
+    As a hook it comes first: what others do at the same time belongs to what follows.
+
+    Attributes:
+        folder: of the checkpoint.
+        time: of the checkpoint in the folder [s]; None: there is none.
+
+    """
+
+    @staticmethod
+    def check(every: float) -> None:
+        """Check before a run that there can be a checkpoint for so many seconds.
+
+        Raises:
+            InputError: they are not positive, or not finite.
+
+        """
+        if not (isfinite(every) and every > 0.0):
+            raise InputError(f"a checkpoint every {every:g} s: must be positive and finite")
+
+    @staticmethod
+    def interval_in(folder: Path) -> float | None:
+        """Interval of the last checkpoint in a folder [s]; None: there is none.
+
+        Raises:
+            InputError: it cannot be read.
+
+        """
+        found = _read(folder)
+        return None if found is None else found.every
+
+    def __init__(
+        self,
+        folder: Path,
+        identity: Identity,
+        every: float,
+        resume: bool,
+        force: bool = False,
+        token: str = "",
+    ) -> None:
+        """Look for a checkpoint; nothing is written before the run begins.
+
+        Args:
+            folder: of the checkpoint.
+            identity: of the run.
+            every: a checkpoint for so many simulated seconds [s].
+            resume: begin with the one that is there, if there is one.
+            force: move aside what is there otherwise.
+            token: random, for a new checkpoint; empty: one is drawn.
+
+        Raises:
+            InputError: the checkpoint there is not asked for, or not the right one.
+
+        """
+        Checkpoints.check(every)
+        self.folder, self._identity, self._every = folder, identity, every
+        self._found = self._look(resume, force)
+        self._token = self._found.identity if self._found else token or uuid4().hex
+        self._log: Log | None = None
+        self.time: float | None = None if self._found is None else self._found.time
+
+    def _look(self, resume: bool, force: bool) -> _Stored | None:
+        """The checkpoint that is there, which the run goes on with."""
+        try:
+            found = _read(self.folder)
+            rows = self.folder / _ROWS
+            # A process that was killed when it began may have left an empty file of rows.
+            is_empty = rows.is_file() and not rows.is_symlink() and not rows.stat().st_size
+            is_ours = found and (is_empty or begins(rows, found.identity))
+            if os.path.lexists(rows) and not is_ours:
+                raise InputError(
+                    f"{rows} is not a file of a checkpoint; move it, choose another folder, or let "
+                    "--force move it aside"
+                )
+            if found is None or found.time is None:
+                return found
+            if not resume:
+                raise InputError(
+                    f"{self.folder} holds a checkpoint at t = {found.time:g} s: --resume continues "
+                    "from it; --force moves it aside and starts over"
+                )
+            if different := differences(found.of, self._identity):
+                raise InputError(
+                    f"{self.folder} belongs to another run: {', '.join(different)} differ; resume "
+                    "that run, or let --force move it aside and start over"
+                )
+        except InputError:
+            if not force:
+                raise
+            for path in (self.folder / _STATE, self.folder / _ROWS):
+                if os.path.lexists(path):
+                    move_aside(path)
+            return None
+        return found
+
+    def begin(self, header: Header) -> None:
+        """Open the file of rows."""
+        self._columns = ("time", *header.columns)
+        rows, width, found = self.folder / _ROWS, len(self._columns), self._found
+        if found is None or found.time is None:
+            self._known, digest = 0, ""
+            # First the proof that the file of rows is ours.
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._store()
+            rows.unlink(missing_ok=True)
+        else:
+            self._known, digest = found.n_rows, found.rows
+        self._row_log = RowLog(rows, self._token, width, self._known, digest)
+
+    def take(self, rows: np.ndarray) -> None:
+        """Write some rows, except the ones that are told again."""
+        again = min(self._known, len(rows))
+        self._known -= again
+        new = rows[again:]
+        if (different := self._row_log.append(new)) and self._log is not None:
+            row, column = different
+            self._log.remark(
+                f"{self._columns[column]} differs at t = {new[row, 0]:g} s from its value before "
+                "the run was resumed: an FMU does not restore all of its state"
+            )
+
+    def end(self, ending: Ending) -> None:
+        """Close the file of rows."""
+        self._row_log.close()
+
+    def act(self, run: Run) -> int:
+        """Write a checkpoint, or begin with one."""
+        self._log = run.log
+        found, self._found = self._found, None
+        if found is not None and found.time is not None:
+            with _explained(self.folder / _STATE):
+                self._resume(run, found)
+        elif run.made:
+            self._write(run)
+        steps = max(round(min(self._every / run.experiment.step, NEVER)), 1)
+        return (run.made // steps + 1) * steps
+
+    def remove(self) -> None:
+        """Remove the files that a finished run no longer needs."""
+        found, rows = _read(self.folder), self.folder / _ROWS
+        if found is not None and found.identity == self._token:
+            # While there are rows, there is the proof that they are ours.
+            self._store()
+            if begins(rows, self._token):
+                rows.unlink()
+            (self.folder / _STATE).unlink()
+        self._partial.unlink(missing_ok=True)
+        with suppress(OSError):
+            # Fails where there is something in it.
+            self.folder.rmdir()
+
+    def _write(self, run: Run) -> None:
+        run.blocks.hand_over()
+        try:
+            self._store(
+                time=run.time,
+                made=run.made,
+                n_rows=run.blocks.count,
+                rows=self._row_log.to_disk(),
+                row=run.row.values.tolist(),
+                states={
+                    name: b64encode(instance.state()).decode()
+                    for name, instance in run.instances.items()
+                },
+                lasting=[one.state() for one in _lasting(run)],
+            )
+        except OSError as error:
+            raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
+        self.time = run.time
+
+    @property
+    def _partial(self) -> Path:
+        return self.folder / f".auv-fmu-{self._token}.json"
+
+    def _store(self, **more: Any) -> None:
+        content = _Stored(self._token, self._every, dict(self._identity), **more)
+        write_whole(self.folder / _STATE, sealed(content._asdict()), self._partial)
+
+    def _resume(self, run: Run, found: _Stored) -> None:
+        # First of all what rows mean: an observer that is told them needs it.
+        for one, state in zip(_lasting(run), found.lasting, strict=True):
+            one.restore(state)
+        first = run.blocks.count  # which was computed anew
+        for rows in self._row_log.kept():
+            run.blocks.tell(rows[first:])
+            run.made += len(rows) - first
+            if run.interrupts:
+                raise KeyboardInterrupt
+            first = 0
+        run.row.values[:] = found.row
+        for name, instance in run.instances.items():
+            instance.restore(b64decode(found.states[name]))
+
+
+def _lasting(run: Run) -> list[Lasting]:
+    hooks = [one for one in run.hooks if isinstance(one, Lasting)]
+    return [run.row.strings, run.overrides, run.log, *hooks]
+
+
+def _read(folder: Path) -> _Stored | None:
+    path = folder / _STATE
+    if not os.path.lexists(path):
+        return None
+    with _explained(path):
+        if not S_ISREG(path.lstat().st_mode):
+            raise ValueError("it is not a file")
+        return _Stored(**unsealed(path.read_text(encoding="utf-8")))
+
+
+@contextmanager
+def _explained(path: Path) -> Iterator[None]:
+    """Name the file of a checkpoint that is damaged or is not one."""
+    try:
+        yield
+    except InputError:
+        raise
+    except (OSError, ValueError, TypeError, LookupError, RecursionError) as error:
+        raise InputError(
+            f"{path}: not a checkpoint: {reason(error)}; move it, or let --force move it aside"
+        ) from error

@@ -1,0 +1,394 @@
+"""An FMU and what its description says about it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree import ElementTree
+
+import fmpy
+from fmpy.model_description import ModelDescription, ValidationError
+
+from orchestrator.cosim.variables import (
+    Terminal,
+    Value,
+    Variable,
+    complete,
+    terminals_of,
+    variables_of,
+)
+from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason, shortened
+from orchestrator.machine.texts import finite, integer, real
+from orchestrator.machine.user_files import unpack, unpacked_folder
+
+_CAUSALITIES = {
+    "structuralParameter", "parameter", "calculatedParameter", "input", "output", "local",
+    "independent",
+}  # fmt: skip
+
+#: Attributes that fmpy reads as Python reads numbers, which takes 1_000, and digits of any script.
+_INTEGERS = {
+    "kg", "m", "s", "A", "K", "mol", "cd", "rad", "valueReference", "value", "index",
+    "dependencies", "derivative", "previous", "clocks",
+}  # fmt: skip
+_REALS = {"factor", "offset", "min", "max"}
+
+#: Attributes that hold several numbers.
+_LISTS = {"dependencies", "clocks"}
+
+#: Elements in which the same words may stand for something else.
+_OTHERS = {"VendorAnnotations", "Annotations", "Start"}
+
+#: The versions of FMI that FMUs may have.
+_VERSIONS = ("2.0", "3.0")
+
+#: How this program names itself in descriptions of FMUs.
+_OWN = "auv-fmu "
+
+
+class Described(NamedTuple):
+    """A description, and its flaw; None: it is valid."""
+
+    description: ModelDescription
+    flaw: Exception | None
+
+    def remark(self) -> str | None:
+        """What is wrong with it, in some words."""
+        if isinstance(self.flaw, ValidationError):
+            first, *others = map(str, self.flaw.problems)
+            return first + f" (and {len(others)} more problems)" * bool(others)
+        return None if self.flaw is None else reason(self.flaw)
+
+
+def read_description(folder: Path) -> Described:
+    """The description in the folder of an unpacked FMU, be it valid or not.
+
+    Raises:
+        Exception: it cannot be read; whatever it is, it says why.
+
+    """
+    flaw: Exception | None = None
+    try:
+        description = fmpy.read_model_description(folder)
+    except Exception as error:
+        flaw = error
+        try:
+            description = fmpy.read_model_description(folder, validate=False)
+        except Exception:
+            raise flaw from None
+    if description.fmiMajorVersion == 3:
+        complete(description, ElementTree.parse(folder / "modelDescription.xml").getroot())
+    return Described(description, flaw)
+
+
+@lru_cache(maxsize=256)
+def described(fmu: Path, folder: Path) -> Described:
+    """The description of an FMU for co-simulation, read once.
+
+    Args:
+        fmu: the file.
+        folder: into which it is unpacked.
+
+    Raises:
+        InputError: it is not such an FMU.
+
+    """
+    file = folder / "modelDescription.xml"
+    if not file.is_file():
+        raise InputError(f"{fmu}: not a readable FMU: it holds no {file.name}")
+    try:
+        root: ElementTree.Element
+        # The version comes first: all else differs between them.
+        with file.open("rb") as source:
+            _, root = next(ElementTree.iterparse(source, ["start"]))
+        version = root.get("fmiVersion")
+        if version not in _VERSIONS:
+            wanted = " or ".join(_VERSIONS)
+            raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {wanted} are supported")
+        found = read_description(folder)
+    except InputError:
+        raise
+    except KeyError as error:
+        why = f"it refers to {error}, which does not exist"
+        raise InputError(f"{fmu}: not a readable FMU: {why}") from error
+    except Exception as error:
+        raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
+    implementation = found.description.coSimulation
+    if implementation is None:
+        scheduled = found.description.modelExchange is None
+        which = "scheduled execution" if scheduled else "model exchange"
+        raise InputError(f"{fmu}: is for {which} only; only co-simulation is supported")
+    if found.description.guid is None:
+        raise InputError(f"{fmu}: not a readable FMU: its description has no guid")
+    identifier = implementation.modelIdentifier
+    if not re.fullmatch(r"[^/\\]+", identifier or ""):
+        raise InputError(f"{fmu}: its model identifier {identifier!r} names no library")
+    if found.flaw is not None:
+        variables = found.description.modelVariables
+        is_clear = len({variable.name for variable in variables}) == len(variables)
+        if not is_clear or any(v.causality not in _CAUSALITIES for v in variables):
+            raise InputError(f"{fmu}: not a readable FMU: {reason(found.flaw)}")
+        for text in _misread(file):
+            raise InputError(f"{fmu}: not a readable FMU: {text}")
+    return found
+
+
+def _misread(file: Path) -> Iterator[str]:
+    """Numbers of a description that Python would misread, or that are not numbers."""
+    for element in _elements(ElementTree.parse(file).getroot()):
+        if element.tag == "Item":
+            for name in sorted({"name", "value"} - element.attrib.keys()):
+                yield f"an <Item> of an enumeration has no {name}"
+        for name in sorted(element.attrib.keys() & (_INTEGERS | _REALS)):
+            text = element.attrib[name]
+            try:
+                for one in text.split() if name in _LISTS else [text]:
+                    (integer if name in _INTEGERS else real)(one)
+            except ValueError:
+                shown = shortened(repr(text))
+                yield f"{name} of <{element.tag}> is {shown}, which is not a number"
+
+
+def _elements(parent: ElementTree.Element) -> Iterator[ElementTree.Element]:
+    """All elements in another one, except some."""
+    for element in parent:
+        if element.tag not in _OTHERS:
+            yield element
+            yield from _elements(element)
+
+
+@dataclass(frozen=True)
+class Component:
+    """An FMU in a system.
+
+    Attributes:
+        name: of the instance.
+        fmu: the file.
+        description: what its modelDescription.xml says.
+        digest: SHA-256 of the file as it was read. That is what runs, and what records name.
+
+    """
+
+    name: str
+    fmu: Path
+    description: ModelDescription
+    digest: str
+
+    @property
+    def folder(self) -> Path:
+        """The folder into which it has been unpacked.
+
+        Raises:
+            InputError: it was read in another process, and the file is another one now.
+
+        """
+        return unpacked_folder(self.fmu, self.digest)
+
+    @cached_property
+    def variables(self) -> Mapping[str, Variable]:
+        """The FMU's variables by name, except the ones that are left alone."""
+        return variables_of(self.description).known
+
+    @property
+    def unsupported(self) -> Mapping[str, str]:
+        """Why others cannot be connected, set or recorded, by name."""
+        return variables_of(self.description).unsupported
+
+    @property
+    def remainder(self) -> str:
+        """Which variables are left alone, in words."""
+        return f"{shortened(', '.join(self.unsupported))}: not supported, and ignored"
+
+    @cached_property
+    def arrays(self) -> dict[str, list[Variable]]:
+        """The elements of each array, in their order."""
+        found: dict[str, list[Variable]] = {}
+        for variable in self.variables.values():
+            if variable.shape:
+                found.setdefault(variable.array, []).append(variable)
+        return found
+
+    @cached_property
+    def terminals(self) -> dict[str, Terminal]:
+        """Its terminals by their names.
+
+        Raises:
+            InputError: the file that lists them cannot be read.
+
+        """
+        try:
+            return terminals_of(self.folder)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from None
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether this program has built the FMU."""
+        return (self.description.generationTool or "").startswith(_OWN)
+
+    @property
+    def is_once_per_process(self) -> bool:
+        """Whether a process may hold one instance of the FMU only."""
+        return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
+
+    @property
+    def takes_any_step(self) -> bool:
+        """Whether its steps may differ in length."""
+        return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
+
+    @property
+    def gives_derivatives(self) -> bool:
+        """Whether it can say how outputs change with inputs."""
+        return bool(self.description.coSimulation.providesDirectionalDerivative)
+
+    @property
+    def takes_linear_inputs(self) -> bool:
+        """Whether it can go back to the beginning of a step, and its inputs change in one."""
+        of = self.description.coSimulation
+        return bool(of.canGetAndSetFMUstate and of.canInterpolateInputs)
+
+    @property
+    def gives_state(self) -> bool:
+        """Whether its whole state can be had as bytes, and taken on from them."""
+        of = self.description.coSimulation
+        return bool(of.canGetAndSetFMUstate and of.canSerializeFMUstate)
+
+    def variable(self, name: str) -> Variable:
+        """One variable of the FMU.
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        if name not in self.variables:
+            _, unsupported, other_names = variables_of(self.description)
+            if why := unsupported.get(name) or other_names.get(name):
+                raise InputError(f"{self.name}.{name} {why}")
+            hint = did_you_mean(name, self.variables)
+            raise InputError(f"{self.name} has no port or parameter {name!r}{hint}")
+        return self.variables[name]
+
+    def elements(self, name: str) -> list[Variable]:
+        """The elements of an array, or a scalar variable.
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        return self.arrays.get(name) or [self.variable(name)]
+
+    def having(self, causality: str) -> list[Variable]:
+        """The variables of one causality, in the order of the description."""
+        return [v for v in self.variables.values() if v.causality == causality]
+
+    def start(self, name: str) -> Value | None:
+        """The start value of a variable, in its type; None: its description names none.
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        variable = self.variable(name)
+        if variable.start is None:
+            return None
+        return variable.typed(variable.start, f"{self.name}.{name}")
+
+    @property
+    def starts(self) -> Mapping[str, Value]:
+        """Start values that the description names, except nonsense, which is of no use."""
+        return _starts_of(self.description)
+
+    def experiment(self, name: str) -> float | None:
+        """What its DefaultExperiment says, such as `stopTime` [s]; None: no number, or nothing."""
+        stated = getattr(self.description.defaultExperiment, name, None)
+        with suppress(ValueError):
+            return None if stated is None else finite(stated, name)
+        return None
+
+    @property
+    def step(self) -> float | None:
+        """The step that the FMU was made for [s]; None: it names none."""
+        step = self.experiment("stepSize")
+        return step if step is not None and step > 0.0 else None
+
+    def is_settable(self, name: str) -> bool:
+        """Whether a variable takes a value before the first step (FMI 2.0.4, section 2.2.7).
+
+        Raises:
+            InputError: there is no such variable.
+
+        """
+        variable = self.variable(name)
+        return variable.causality == "input" or (
+            variable.variability != "constant"
+            and variable.initial in ("exact", "approx")
+            # Sizes of arrays are the ones that the description begins with.
+            and variable.causality != "structuralParameter"
+        )
+
+    def is_continuous(self, name: str) -> bool:
+        """Whether a variable may change at any time (FMI 2.0.4, section 2.2.7)."""
+        variable = self.variable(name)
+        return variable.family == "Real" and variable.variability in (None, "continuous")
+
+    def has_feedthrough(self, output: str) -> bool:
+        """Whether an output depends on an input of the same instant."""
+        return output in self._feedthrough
+
+    @cached_property
+    def _feedthrough(self) -> frozenset[str]:
+        return _feedthrough_of(self.description)
+
+
+# What all components of an FMU share is found once: there may be thousands of them.
+
+
+@lru_cache(maxsize=256)
+def _starts_of(description: ModelDescription) -> Mapping[str, Value]:
+    values: dict[str, Value] = {}
+    for name, variable in variables_of(description).known.items():
+        if variable.start is not None:
+            with suppress(InputError):
+                values[name] = variable.typed(variable.start, name)
+    return values
+
+
+@lru_cache(maxsize=256)
+def _feedthrough_of(description: ModelDescription) -> frozenset[str]:
+    """An FMU that does not say must be taken to have it (FMI 2.0.4, section 2.2.8)."""
+    free = {
+        unknown.variable.name
+        for unknown in description.outputs
+        if unknown.dependencies is not None
+        and not any(variable.causality == "input" for variable in unknown.dependencies)
+    }
+    variables = variables_of(description).known.values()
+    return frozenset(v.name for v in variables if v.causality == "output" and v.array not in free)
+
+
+def read_component(
+    name: str,
+    fmu: Path,
+    findings: Findings | None = None,
+) -> Component:
+    """An FMU as a component.
+
+    Args:
+        name: of the instance.
+        fmu: the file.
+        findings: take notes of harmless flaws in its description.
+
+    Raises:
+        InputError: the file is missing or is not such an FMU for co-simulation.
+
+    """
+    folder, digest = unpack(fmu)
+    found = described(fmu, folder)
+    if findings is not None and (remark := found.remark()):
+        findings.note(f"{name}: the description of {fmu.name} is not valid: {remark}")
+    return Component(name, fmu, found.description, digest)

@@ -1,1 +1,0 @@
-"""What acts between two steps: events, inputs that follow a table, a clock, checkpoints."""

@@ -1,0 +1,583 @@
+"""Variables of an FMU, with their types and values; arrays as their elements."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import lru_cache
+from itertools import product
+from math import copysign, isclose, isfinite, prod
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple, TypeAlias
+from xml.etree import ElementTree
+
+import numpy as np
+from fmpy.model_description import ModelDescription, ModelVariable
+
+from orchestrator.machine.errors import InputError, shortened
+from orchestrator.machine.texts import BOOLEANS, finite, integer, real, transferable, whole
+
+#: A value in the type of its variable.
+Value: TypeAlias = float | int | bool | str
+
+
+class Type(NamedTuple):
+    """A type of FMI's variables.
+
+    Attributes:
+        family: what FMI 2.0 calls this type, or the one that is its like.
+        c_type: of its values; None: they are texts.
+        least, most: the range of its numbers.
+
+    """
+
+    family: str
+    c_type: Any
+    least: float = 0
+    most: float = 0
+
+    @property
+    def is_wide(self) -> bool:
+        """Whether it has integers that a double cannot hold."""
+        return self.family == "Integer" and self.most > EXACT
+
+    @property
+    def stands(self) -> bool:
+        """Whether numbers of a row may stand for its values, and are not the values themselves."""
+        return self.c_type is None or self.is_wide
+
+
+def _real(c_type: Any) -> Type:
+    most = float(np.finfo(np.dtype(c_type)).max)
+    return Type("Real", c_type, -most, most)
+
+
+def _integer(c_type: Any, family: str = "Integer") -> Type:
+    info = np.iinfo(np.dtype(c_type))
+    return Type(family, c_type, int(info.min), int(info.max))
+
+
+#: Types that can be connected, set and recorded, in the order of their columns.
+TYPES = {
+    "Real": _real(ctypes.c_double),
+    "Float64": _real(ctypes.c_double),
+    "Float32": _real(ctypes.c_float),
+    "Integer": _integer(ctypes.c_int32),
+    "Int32": _integer(ctypes.c_int32),
+    "Int8": _integer(ctypes.c_int8),
+    "UInt8": _integer(ctypes.c_uint8),
+    "Int16": _integer(ctypes.c_int16),
+    "UInt16": _integer(ctypes.c_uint16),
+    "UInt32": _integer(ctypes.c_uint32),
+    "Int64": _integer(ctypes.c_int64),
+    "UInt64": _integer(ctypes.c_uint64),
+    "Enumeration": _integer(ctypes.c_int32, "Enumeration"),
+    "Boolean": Type("Boolean", ctypes.c_bool, 0, 1),
+    "String": Type("String", None),
+}
+
+#: Up to here every integer is a double.
+EXACT = 2**53
+
+#: Numbers from the first on, so far apart, stand for integers that a double cannot hold: they
+#: are doubles themselves, and none of FMI's integers is so large.
+_BEYOND, _APART = 2.0**65, 2.0**13
+
+#: An FMU may keep a value in another unit, and round it by such a share.
+_ROUNDING = 1e-9
+
+
+def family_of(fmi_type: str) -> str:
+    """What FMI 2.0 calls a type, or the one that is its like."""
+    return TYPES[fmi_type].family if fmi_type in TYPES else fmi_type
+
+
+def same(wanted: Value, held: Value) -> bool:
+    """Whether a value is the one that was set, apart from rounding."""
+    if isinstance(wanted, float) and isinstance(held, float):
+        return isclose(wanted, held, rel_tol=_ROUNDING)
+    return wanted == held
+
+
+def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
+    """Which numbers of a row a variable of a type can hold; doubles and texts take all."""
+    of = TYPES[fmi_type]
+    if of.family == "Boolean":
+        # FMI 2.0 has integers for them.
+        of = TYPES["Integer"]
+    if of.c_type in (None, ctypes.c_double):
+        return np.ones(np.shape(numbers), dtype=bool)
+    # As a double, the end of 64 bits is the first number beyond it.
+    fit = of.least <= numbers
+    fit &= numbers < float(of.most) if of.is_wide else numbers <= of.most
+    if of.family != "Real":
+        fit &= numbers == np.trunc(numbers)
+    if of.is_wide:
+        fit |= np.abs(numbers) >= _BEYOND
+    return np.asarray(fit)
+
+
+def as_float32(numbers: np.ndarray) -> np.ndarray:
+    """Numbers as a Float32 holds them; those that are too large for one stay as they are."""
+    fit = np.abs(numbers) <= TYPES["Float32"].most
+    return np.where(fit, np.where(fit, numbers, 0.0).astype(np.float32), numbers)
+
+
+class StringTable:
+    """Texts by their numbers, which they keep: the first is empty, and the next one takes the next.
+
+    What FMUs say is not forgotten, so that a run in which one has a new text in every step takes
+    memory for all of them. Integers that a double cannot hold are kept like texts.
+    """
+
+    def __init__(self) -> None:
+        """Begin with the empty text."""
+        self.restore([""])
+
+    def number(self, text: str) -> int:
+        """The number of a text, which it gets if it has none."""
+        found = self._numbers.setdefault(text, len(self._texts))
+        if found == len(self._texts):
+            self._texts.append(text)
+        return found
+
+    def text(self, number: float) -> str:
+        """The text of a number.
+
+        Raises:
+            ValueError: it has none.
+
+        """
+        if not 0 <= number < len(self._texts):
+            raise ValueError(f"no text has the number {number:g}")
+        return self._texts[int(number)]
+
+    def stand_in(self, value: Value) -> float:
+        """The number for a value in a row: itself, unless it is a text or no double can hold it."""
+        if isinstance(value, str):
+            return self.number(value)
+        number = float(value)
+        if isinstance(value, int) and number != value:
+            return copysign(_BEYOND + _APART * self.number(str(value)), number)
+        return number
+
+    def integer(self, number: float) -> int:
+        """The integer that a number of a row is, or stands for.
+
+        Raises:
+            ValueError: it stands for none.
+
+        """
+        size = abs(number)
+        return int(number) if size < _BEYOND else int(self.text((size - _BEYOND) / _APART))
+
+    def state(self) -> list[str]:
+        """All of them, as JSON has them."""
+        return list(self._texts)
+
+    def restore(self, state: Iterable[str]) -> None:
+        """Take on the texts of another process, with their numbers."""
+        self._texts = list(state)
+        self._numbers = {text: number for number, text in enumerate(self._texts)}
+
+
+class Standing(NamedTuple):
+    """What the numbers of a column of the row stand for.
+
+    Attributes:
+        fmi_type: of the values.
+        strings: that know them.
+
+    """
+
+    fmi_type: str
+    strings: StringTable
+
+    @property
+    def c_type(self) -> Any:
+        """Of the values; None: they are texts."""
+        return TYPES[self.fmi_type].c_type
+
+    def value(self, number: float) -> str | int:
+        """The text or the integer that a number stands for.
+
+        Raises:
+            ValueError: it stands for none.
+
+        """
+        return self.strings.text(number) if self.c_type is None else self.strings.integer(number)
+
+    def values(self, numbers: np.ndarray) -> np.ndarray:
+        """A column in its type, from its numbers in the row.
+
+        Raises:
+            ValueError: a number stands for no value.
+
+        """
+        if self.c_type is not None and (np.abs(numbers) < _BEYOND).all():
+            return numbers.astype(self.c_type)
+        return np.array(list(map(self.value, numbers.tolist())), dtype=self.c_type or str)
+
+    def number(self, value: str | float) -> float:
+        """The number that stands for a value, or for the text of one."""
+        if self.c_type is None:
+            return self.strings.number(str(value))
+        return self.strings.stand_in(int(value))
+
+
+#: An array has no more elements than this: each is a column.
+MOST_ELEMENTS = 1_000_000
+
+#: What stands between the start values of an array of texts: no text holds it.
+_BETWEEN = "\0"
+
+#: Types in words.
+_IN_WORDS = {
+    "Real": "a real number",
+    "Boolean": "a Boolean (true or false)",
+    "String": "a text in UTF-8",
+}
+
+
+class Variable(NamedTuple):
+    """A variable of an FMU, or one element of an array.
+
+    Attributes:
+        name: its name, of an element with its indices.
+        type: its type in FMI.
+        causality, variability, initial: as FMI defines them.
+        reference: its value reference, which the elements of an array share.
+        start, min, max, nominal: attributes of the description, as texts.
+        unit: its own, or its type's.
+        is_relative: whether it is a difference, such as one of temperatures.
+        shape: of the array that it is an element of; empty: it is a scalar.
+        items: the values of an Enumeration by their names, as the description writes them.
+        enumeration: the name of that type.
+        description: its text in the description.
+
+    """
+
+    name: str
+    type: str
+    causality: str | None = None
+    variability: str | None = None
+    initial: str | None = None
+    reference: int = 0
+    start: str | None = None
+    min: str | None = None
+    max: str | None = None
+    nominal: str | None = None
+    unit: str | None = None
+    is_relative: bool = False
+    shape: tuple[int, ...] = ()
+    items: Mapping[str, str] = MappingProxyType({})
+    enumeration: str | None = None
+    description: str | None = None
+
+    @classmethod
+    def of(cls, variable: ModelVariable) -> Variable:
+        """Take a scalar variable, or a whole array, of a description."""
+        own = variable.declaredType
+        choices = own is not None and family_of(variable.type) == "Enumeration"
+        return cls(
+            variable.name,
+            variable.type,
+            variable.causality,
+            variable.variability,
+            variable.initial,
+            variable.valueReference,
+            variable.start,
+            variable.min,
+            variable.max,
+            variable.nominal,
+            variable.unit or (own.unit if own is not None else None),
+            bool(variable.relativeQuantity or (own is not None and own.relativeQuantity)),
+            tuple(variable.shape or ()),
+            {item.name: item.value for item in own.items} if choices else {},
+            own.name if choices else None,
+            variable.description,
+        )
+
+    @property
+    def array(self) -> str:
+        """The name by which the FMU knows it: the array's, for an element."""
+        return self.name.rpartition("[")[0] if self.shape else self.name
+
+    @property
+    def family(self) -> str:
+        """Its type in FMI 2.0, or the one that corresponds to it there."""
+        return family_of(self.type)
+
+    def typed(self, value: object, name: str) -> Value:
+        """Convert a value, or its text from a command line or file, to the variable's type.
+
+        Args:
+            value: a number, a truth value or a text.
+            name: of the variable in the system, for messages.
+
+        Raises:
+            InputError: it is not of that type, not finite, or out of range.
+
+        """
+        shown = ""
+        try:
+            text = str(value).strip()
+            shown = f" = {shortened(text)}"
+            if self.family == "Boolean":
+                return BOOLEANS[text.lower()]
+            if self.family == "String":
+                return transferable(str(value))
+            read = real if self.family == "Real" else integer
+            number = read(self.items.get(text, text))
+            if self.items and not any(number == int(item) for item in self.items.values()):
+                raise ValueError(f"{number} is not an item")
+        except (KeyError, ValueError):
+            # Python itself refuses to write and to read integers of very many digits.
+            names = ", ".join(self.items)
+            words = f"one of {names}" if names else _IN_WORDS.get(self.family, "an integer")
+            raise InputError(f"{name}{shown}: not {words}") from None
+        if isinstance(number, float) and not isfinite(number):
+            raise InputError(f"{name}{shown}: must be finite")
+        lower, upper = self._range
+        if number < lower:
+            raise InputError(f"{name}{shown}: must be at least {_written(lower)}")
+        if number > upper:
+            raise InputError(f"{name}{shown}: must be at most {_written(upper)}")
+        # The value that the FMU will hold.
+        return ctypes.c_float(number).value if self.type == "Float32" else number
+
+    def cell(self, value: object, where: str = "") -> Value:
+        """Convert a value of a table: a number, a truth value or the name of an item.
+
+        Args:
+            value: as a run or a user writes it; its range does not count.
+            where: it stands, for messages.
+
+        Raises:
+            ValueError: it is neither a finite number nor another value of the type.
+
+        """
+        text = str(value)
+        if self.family == "String":
+            return transferable(text)
+        word = text.strip()
+        if self.family == "Boolean" and word.lower() in BOOLEANS:
+            return BOOLEANS[word.lower()]
+        word = self.items.get(word, word)
+        return finite(word, where) if self.family == "Real" else whole(word, where)
+
+    def shown(self, value: Any) -> Any:
+        """A value as a user writes it: an item of an Enumeration by its name."""
+        names = (name for name, number in self.items.items() if int(number) == value)
+        return next(names, value)
+
+    def holds(self, value: object) -> bool:
+        """Whether a value is one that the variable can have."""
+        if isinstance(value, str):
+            # Half of a UTF-16 pair is not text.
+            is_text = value.encode(errors="ignore").decode() == value
+            return self.family == "String" and is_text
+        if type(value) is int:
+            own = TYPES[self.type]
+            is_whole = self.family in ("Integer", "Enumeration")
+            return is_whole and own.least <= value <= own.most
+        return type(value) is {"Real": float, "Boolean": bool}.get(self.family)
+
+    @property
+    def _range(self) -> tuple[float, float]:
+        """The description's range, within that of the type."""
+        own = TYPES[self.type]
+        lower = own.least if self.min is None else max(own.least, _end(self.min))
+        upper = own.most if self.max is None else min(own.most, _end(self.max))
+        return lower, upper
+
+
+def _end(text: str) -> float:
+    """An end of a range, exact where it is an integer."""
+    with suppress(ValueError):
+        return integer(text)
+    return real(text)
+
+
+def _written(end: float) -> str:
+    return str(end) if isinstance(end, int) else f"{end:.16g}"
+
+
+class Variables(NamedTuple):
+    """The variables of an FMU.
+
+    Attributes:
+        known: those that can be connected, set and recorded, by name. An element of an array is
+            one of them, with the array's shape, its neighbours in their order beside it.
+        unsupported: why others cannot, by name.
+        other_names: what to write instead of names that stand for known ones.
+
+    """
+
+    known: Mapping[str, Variable]
+    unsupported: Mapping[str, str]
+    other_names: Mapping[str, str]
+
+
+@lru_cache(maxsize=256)
+def variables_of(description: ModelDescription) -> Variables:
+    """The variables of an FMU."""
+    known: dict[str, Variable] = {}
+    unsupported: dict[str, str] = {}
+    other_names: dict[str, str] = {}
+    names = {variable.name for variable in description.modelVariables}
+    for variable in description.modelVariables:
+        if reason := _reason(variable):
+            unsupported[variable.name] = reason
+            continue
+        first = next(element_names(variable.name, variable.shape or ()))
+        if variable.shape and first in names:
+            unsupported[variable.name] = (
+                f"is an array, but its element {first} is another variable's name"
+            )
+        elif variable.alias is not None:
+            other_names[variable.name] = f"is another name of {variable.alias.name}: use that one"
+        elif variable.shape:
+            other_names[variable.name] = f"is an array: name an element, as {first}"
+            known |= {element.name: element for element in _elements(Variable.of(variable))}
+        else:
+            known[variable.name] = Variable.of(variable)
+    return Variables(known, unsupported, other_names)
+
+
+def _reason(variable: ModelVariable) -> str:
+    """Why a variable is left alone; empty: it is not."""
+    if variable.type not in TYPES:
+        return f"is of type {variable.type}, which is not supported"
+    if variable.clocks:
+        return "belongs to a Clock, and Clocks are not supported"
+    if any(length < 1 for length in variable.shape or ()):
+        return "is an array without elements"
+    if prod(variable.shape or ()) > MOST_ELEMENTS:
+        return f"is an array of more than {MOST_ELEMENTS:,} elements"
+    return ""
+
+
+def element_names(array: str, shape: Sequence[int]) -> Iterator[str]:
+    """The names of an array's elements by FMI's naming convention, in their order.
+
+    Args:
+        array: its name.
+        shape: its lengths, of which indices begin with 1; empty: it is a scalar.
+
+    """
+    for indices in product(*(range(1, length + 1) for length in shape)):
+        yield f"{array}[{','.join(map(str, indices))}]" if indices else array
+
+
+def _elements(array: Variable) -> Iterator[Variable]:
+    n = prod(array.shape)
+    starts = _starts(array)
+    if len(starts) == 1:
+        # It is for all.
+        starts *= n
+    for place, name in enumerate(element_names(array.name, array.shape)):
+        start = starts[place] if place < len(starts) else None
+        yield array._replace(name=name, start=start)
+
+
+def _starts(array: Variable) -> list[str]:
+    if array.start is None:
+        return []
+    return array.start.split(_BETWEEN if array.type == "String" else None)
+
+
+def references_of(variables: Sequence[Variable]) -> list[int]:
+    """Value references of some variables, one for all elements of an array."""
+    found, place = [], 0
+    while place < len(variables):
+        found.append(variables[place].reference)
+        place += prod(variables[place].shape)
+    return found
+
+
+def complete(description: ModelDescription, root: ElementTree.Element) -> None:
+    """Add what fmpy does not read of a description of FMI 3.0.
+
+    Args:
+        description: as fmpy has read it.
+        root: element of the file.
+
+    """
+    if description.coSimulation is not None:
+        stated = root.find("CoSimulation")
+        assert stated is not None
+        gives = stated.get("providesDirectionalDerivatives")
+        description.coSimulation.providesDirectionalDerivative = gives in ("true", "1")
+        # A capability of FMI 2.0.
+        description.coSimulation.canInterpolateInputs = False
+    elements = {element.get("name"): element for element in root.findall("ModelVariables/*")}
+    for variable in description.modelVariables:
+        element = elements.get(variable.name)
+        if element is None:
+            continue
+        if variable.type.startswith("UInt"):
+            variable.min, variable.max = element.get("min"), element.get("max")
+        if variable.shape and variable.type == "String":
+            texts = [start.get("value", "") for start in element.findall("Start")]
+            variable.start = _BETWEEN.join(texts) if texts else None
+
+
+_MEMBER = "TerminalMemberVariable"
+
+#: Matching rules of terminals: those with which all members are connected, and the other one.
+COMPLETE, BUS = ("plug", "sequence"), "bus"
+
+
+class Terminal(NamedTuple):
+    """Variables that are connected as one thing.
+
+    Attributes:
+        rule: which of its members are connected: all of a plug, by their names; of a bus the ones
+            that the other terminal has; all of a sequence, by their places, which are its names.
+        members: names of variables by the names of the members.
+        flows: members that are no signals: sums and signs count as well where these are joined.
+
+    """
+
+    rule: str
+    members: Mapping[str, str]
+    flows: Sequence[str]
+
+
+def terminals_of(folder: Path) -> dict[str, Terminal]:
+    """The terminals of an unpacked FMU by their names; one within another has a dotted name.
+
+    Raises:
+        InputError: the file that lists them cannot be read.
+
+    """
+    file = folder / "terminalsAndIcons" / "terminalsAndIcons.xml"
+    if not file.is_file():
+        return {}
+    try:
+        root = ElementTree.parse(file).getroot()
+    except ElementTree.ParseError as error:
+        raise InputError(f"{file.name} is not well-formed XML: {error}") from None
+    return dict(_terminals(root.find("Terminals"), ""))
+
+
+def _terminals(parent: ElementTree.Element | None, outer: str) -> Iterator[tuple[str, Terminal]]:
+    for element in () if parent is None else parent.findall("Terminal"):
+        name, rule = outer + element.get("name", ""), element.get("matchingRule", "")
+        members = [
+            (member.get("memberName", ""), member.get("variableName", ""))
+            for member in element.findall(_MEMBER)
+        ]
+        if rule == "sequence":
+            members = [(str(place), variable) for place, (_, variable) in enumerate(members)]
+        flows = [
+            member.get("variableName") or member.get("inStreamVariableName") or ""
+            for member in element
+            if member.tag == "TerminalStreamMemberVariable"
+            or (member.tag == _MEMBER and member.get("variableKind") != "signal")
+        ]
+        yield name, Terminal(rule, dict(members), flows)
+        yield from _terminals(element, f"{name}.")
