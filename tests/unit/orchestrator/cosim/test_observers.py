@@ -1,8 +1,9 @@
-"""Rows and columns that are kept, whatever the blocks in which rows come."""
+"""Rows that are kept and written, whatever the blocks in which they come."""
 
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,10 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.observers import Ending, Header, Progress, Selection, Table
+from orchestrator.cosim.connection import PortName
+from orchestrator.cosim.experiment import Experiment, Order
+from orchestrator.cosim.observers import TABLE_FORMATS, Ending, Header, Progress, Selection, Table
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.texts import matches, matching
+from orchestrator.runs.tables import read_columns, read_rows
 
 COLUMNS = ("a.x", "a.y", "b.k[1]", "b.k[2]")
 CUTS = st.lists(st.integers(1, 999), max_size=5)
@@ -86,3 +89,80 @@ def test_bar_is_a_widget_in_a_notebook_that_has_widgets(monkeypatch, kernel, wid
     monkeypatch.setattr(f"{where}.find_spec", lambda _: SimpleNamespace() if widgets else None)
     Progress("fig4").begin(Header((), Experiment(1.0, 0.1)))
     assert made == ["tqdm.notebook" if kernel and widgets else "tqdm"]
+
+
+def table(times: list[float], order: Order = "gauss-seidel") -> Table:
+    """`a.t` holds the time; `a.start` the time at which the step of the row began, 0.1 s before."""
+    t = np.array(times)
+    header = Header(("a.t", "a.start"), Experiment(10.0, 0.1, order), {PortName("a", "gain"): 2.0})
+    return Table.of(header, np.column_stack([t, t, t - 0.1]))
+
+
+def test_values_of_a_step_belong_to_the_time_at_which_it_began():
+    whole = table([0.0, 0.1, 0.2, 0.3])
+    np.testing.assert_allclose(whole.step_start, whole.step_values("a.start")[:, 0], atol=1e-15)
+    np.testing.assert_allclose(whole.start_values("a.t")[:, 0], whole.step_start)
+
+
+def test_steps_keep_their_times_where_rows_were_left_out():
+    thinned = table([0.0, 0.1, 1.0, 1.1, 2.0])
+    np.testing.assert_allclose(thinned.step_start, [0.0, 0.9, 1.0, 1.9])
+    # The row before 1.0 is not there: its own values stand in, a step later.
+    np.testing.assert_allclose(thinned.start_values("a.t")[:, 0], [0.0, 1.0, 1.0, 2.0])
+
+
+def test_without_a_lag_values_of_a_step_stand_in_the_row_of_its_time():
+    """The last row begins no step; where rows were left out, each has its own time."""
+    for times in ([0.0, 0.1, 0.2, 0.3], [0.0, 0.1, 1.0, 1.1, 2.0]):
+        whole = table(times, "feedthrough")
+        assert whole.step_start.tolist() == times[:-1]
+        assert whole.step_values("a.t")[:, 0].tolist() == times[:-1]
+        assert whole.start_values("a.t")[:, 0].tolist() == times[:-1]
+
+
+def test_unknown_column_has_a_suggestion():
+    with pytest.raises(KeyError, match=r"did you mean a\.start"):
+        table([0.0])["a.strat"]
+
+
+def test_missing_names_what_is_not_there():
+    assert table([0.0]).missing(["a.t", "b.x"], ["a.gain", "a.loss"]) == ["b.x", "a.loss"]
+
+
+def test_more_rows_than_fit_are_refused_before_the_run():
+    with pytest.raises(InputError, match="do not fit into memory"):
+        Table().begin(Header(("a.t",), Experiment(1e6, 0.01)))
+
+
+@pytest.mark.parametrize("ending", TABLE_FORMATS)
+def test_what_is_written_is_read_again_exactly(tmp_path: Path, ending: str):
+    if ending == "parquet":
+        pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
+    path = tmp_path / f"result.{ending}"
+    rows = np.random.default_rng(1).normal(scale=1e3, size=(20_001, 4))
+    rows[5] = [1e-310, -0.0, 1.7976931348623157e308, np.nextafter(1.0, 2.0)]
+    file = TABLE_FORMATS[ending](path)
+    file.begin(Header(("a.x", "a.y", "b.z"), Experiment(1.0, 0.1)))
+    for block in np.split(rows, [1, 600, 19_000]):
+        file.take(block)
+    file.end(Ending())
+    assert read_columns(path) == ("a.x", "a.y", "b.z")
+    read = list(read_rows(path))
+    assert len(read) > 1, "in blocks"
+    assert np.vstack(read).tobytes() == rows.tobytes()
+
+
+def test_parquet_of_the_same_rows_is_the_same_file(tmp_path: Path):
+    """However long its observer had to wait for them."""
+    pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
+    rows = np.random.default_rng(1).normal(size=(20_000, 2))
+    files = []
+    for i, block in enumerate((512, 700, 20_000)):
+        path = tmp_path / f"{i}.parquet"
+        file = TABLE_FORMATS["parquet"](path)
+        file.begin(Header(("a.x",), Experiment(1.0, 0.1)))
+        for start in range(0, len(rows), block):
+            file.take(rows[start : start + block])
+        file.end(Ending())
+        files.append(path.read_bytes())
+    assert files[0] == files[1] == files[2]

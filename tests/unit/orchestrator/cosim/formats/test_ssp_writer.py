@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,16 +12,16 @@ from zipfile import ZipFile
 
 import pytest
 from fmpy.ssp.ssd import read_ssd, read_ssv
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from lxml import etree
 
-from orchestrator.cosim.component import read_component
+from orchestrator.cosim.component import Component, read_component
 from orchestrator.cosim.connection import Connection, Linear, Mapped, PortName
 from orchestrator.cosim.formats.archive import OMS
 from orchestrator.cosim.formats.osp import write_osp
 from orchestrator.cosim.formats.ssp_reader import read_ssp
-from orchestrator.cosim.formats.ssp_writer import write_ssp
+from orchestrator.cosim.formats.ssp_writer import ssp_bytes, structure_xml, write_ssp
 from orchestrator.cosim.system import System
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.file_names import plain_file_names
@@ -374,3 +375,355 @@ def test_an_fmu_that_has_changed_since_it_was_read_is_refused(tmp_path: Path, wr
     with pytest.raises(InputError) as error:
         write(system, tmp_path / "out")
     assert mentions(str(error.value), "a.fmu changed")
+
+
+#: What an FMU of FMI 2.0 has: two Reals in one unit, one in another, a number, and a parameter.
+PORTS = (
+    variable("u.x", "input", unit="m"), variable("v", "input", unit="km"),
+    variable("n", "input", "Integer"), variable("y.x", "output", unit="m"),
+    variable("m", "output", "Integer"), variable("k", "parameter"),
+)  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def parts(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Component]:
+    """A component of each FMU: of FMI 2.0, of FMI 3.0 with arrays, and one whose m is a foot."""
+    folder = tmp_path_factory.mktemp("fmus")
+    foot = fmu(folder / "foot.fmu", *PORTS)
+    with ZipFile(foot) as content:
+        text = content.read("modelDescription.xml").decode()
+    with ZipFile(foot, "w") as content:
+        meter = '<Unit name="m"><BaseUnit m="1"/>'
+        assert meter in text
+        feet = text.replace(meter, meter.replace('m="1"', 'm="1" factor="0.3048"'))
+        content.writestr("modelDescription.xml", feet)
+    files = {"2": fmu(folder / "2.fmu", *PORTS), "3": fmu3(folder / "3.fmu"), "foot": foot}
+    return {name: read_component(name, file) for name, file in files.items()}
+
+
+def system_of(
+    parts: dict[str, Component],
+    kinds: dict[str, str],
+    wires: dict[str, str],
+    made: dict[str, (Linear | Mapped)] | None = None,
+    **others: object,
+) -> System:
+    """A system of components by the kinds of their FMUs, and targets by their sources.
+
+    Args:
+        parts: components by their kinds.
+        kinds: by names.
+        wires: sources by targets, each a component and a port with a colon between them.
+        made: transformations by targets.
+        others: further attributes of the system.
+
+    """
+
+    def port(text: str) -> PortName:
+        component, _, name = text.partition(":")
+        return PortName(component, name)
+
+    return System(
+        "nested",
+        {name: replace(parts[kind], name=name) for name, kind in kinds.items()},
+        tuple(
+            Connection(port(source), port(target), (made or {}).get(target))
+            for target, source in wires.items()
+        ),
+        **{"start_time": 0.0, **others},
+    )
+
+
+def round_trip(system: System, offered: bool = False) -> System:
+    with TemporaryDirectory() as folder:
+        [path] = write_ssp(system, Path(folder), connectors=offered)
+        return read_ssp(path, findings=Findings(strict=True))
+
+
+def check_same(again: System, system: System) -> None:
+    assert list(again.components) == list(system.components)
+    digests = [{n: c.digest for n, c in one.components.items()} for one in (again, system)]
+    assert digests[0] == digests[1]
+    # Each input has one connection, so their order says nothing.
+    assert len(again.connections) == len(system.connections)
+    assert set(again.connections) == set(system.connections)
+    assert again.parameters == system.parameters
+    assert (again.steps, again.left_open) == (system.steps, system.left_open)
+    experiments = [(one.start_time, one.stop_time, one.step) for one in (again, system)]
+    assert experiments[0] == experiments[1]
+
+
+def structure(system: System, offered: bool = False) -> ElementTree.Element:
+    with TemporaryDirectory() as folder:
+        [path] = write_ssp(system, Path(folder), connectors=offered)
+        with ZipFile(path) as content:
+            text = content.read("SystemStructure.ssd").decode()
+    root = ElementTree.fromstring(text)
+    for element in root.iter():
+        element.tag = element.tag.rpartition("}")[2]
+    [found] = root.findall("System")
+    return found
+
+
+def connectors(element: ElementTree.Element) -> list[tuple[str, str]]:
+    """Names and kinds of the connectors of a system."""
+    found = element.findall("Connectors/Connector")
+    return [(one.get("name", ""), one.get("kind", "")) for one in found]
+
+
+def lines(element: ElementTree.Element) -> set[tuple[str, str]]:
+    """The connections in a system, ends with a colon between element and connector."""
+    return {
+        (
+            f"{one.get('startElement', '')}:{one.get('startConnector')}",
+            f"{one.get('endElement', '')}:{one.get('endConnector')}",
+        )
+        for one in element.findall("Connections/Connection")
+    }
+
+
+def test_values_cross_borders_by_one_connector_for_each_output(parts: dict[str, Component]):
+    system = system_of(
+        parts,
+        {"a.p": "2", "a.c": "2", "b.p": "2", "b.in.p": "2", "top": "2"},
+        {
+            "a.c:u.x": "a.p:y.x", "b.p:u.x": "a.p:y.x", "b.in.p:u.x": "a.p:y.x",
+            "top:u.x": "a.p:y.x", "a.p:n": "top:m", "a.p:u.x": "b.in.p:y.x",
+        },
+    )  # fmt: skip
+    outer = structure(system)
+    a, b, _ = outer.find("Elements") or ()
+    inner = b.find("Elements/System")
+    assert inner is not None
+    assert (a.get("name"), b.get("name"), inner.get("name")) == ("a", "b", "in")
+    assert [one.get("name") for one in a.findall("Elements/Component")] == ["p", "c"]
+    assert connectors(outer) == []
+    assert set(connectors(a)) == {
+        ("a_p_y_x", "output"), ("top_m", "input"), ("b_in_p_y_x", "input"),
+    }  # fmt: skip
+    assert set(connectors(b)) == {("a_p_y_x", "input"), ("b_in_p_y_x", "output")}
+    assert set(connectors(inner)) == {("a_p_y_x", "input"), ("b_in_p_y_x", "output")}
+    assert lines(outer) == {
+        ("a:a_p_y_x", "b:a_p_y_x"), ("a:a_p_y_x", "top:u.x"), ("top:m", "a:top_m"),
+        ("b:b_in_p_y_x", "a:b_in_p_y_x"),
+    }  # fmt: skip
+    assert lines(a) == {
+        ("p:y.x", "c:u.x"), ("p:y.x", ":a_p_y_x"), (":top_m", "p:n"), (":b_in_p_y_x", "p:u.x"),
+    }  # fmt: skip
+    assert lines(b) == {
+        (":a_p_y_x", "p:u.x"), (":a_p_y_x", "in:a_p_y_x"), ("in:b_in_p_y_x", ":b_in_p_y_x"),
+    }  # fmt: skip
+    assert lines(inner) == {(":a_p_y_x", "p:u.x"), ("p:y.x", ":b_in_p_y_x")}
+    units = {one.get("unit") for one in outer.iterfind(".//System/Connectors/Connector/Real")}
+    assert units == {"m"}
+    check_same(round_trip(system), system)
+
+
+def test_flat_system_has_no_system_in_it(parts: dict[str, Component]):
+    outer = structure(system_of(parts, {"a": "2", "b": "3"}, {"b:x": "a:y.x"}))
+    assert outer.findall(".//System") == []
+
+
+def test_no_two_connectors_of_a_system_are_one_nor_one_an_element(parts: dict[str, Component]):
+    """The names of elements here are those that connectors would have."""
+    system = system_of(
+        parts,
+        {"a.p": "2", "a.a_p_m": "2", "a.q.p": "2", "a.q_p": "2", "b": "2", "c": "2"},
+        {
+            "b:u.x": "a.p:y.x", "b:n": "a.p:m", "c:u.x": "a.q.p:y.x", "c:n": "a.q_p:m",
+            "a.p:u.x": "a.q_p:y.x", "b:v": "a.q_p:y.x",
+        },
+        {"b:v": Linear()},
+    )  # fmt: skip
+    outer = structure(system)
+    names = [name for name, _ in connectors((outer.find("Elements") or [])[0])]
+    assert sorted(names) == ["a_p_m_", "a_p_y_x", "a_q_p_m", "a_q_p_y_x", "a_q_p_y_x_"]
+    check_same(round_trip(system), system)
+
+
+def test_connectors_with_dots_are_read_as_well(parts: dict[str, Component], tmp_path: Path):
+    """As archives had them before."""
+    system = system_of(parts, {"a.p": "2", "b.c.p": "2"}, {"b.c.p:u.x": "a.p:y.x"})
+    text = structure_xml(system).decode()
+    assert 'name="a_p_y_x"' in text
+    files = {"resources/2.fmu": parts["2"].fmu}
+    older = archive(tmp_path / "older.ssp", text.replace("a_p_y_x", "p_y.x"), files)
+    check_same(read_ssp(older, findings=Findings(strict=True)), system)
+
+
+def test_a_name_that_begins_another_component_stays_one(parts: dict[str, Component]):
+    """As do parts of names without letters."""
+    kinds = dict.fromkeys(("a", "a.b", "a.b.c.d", "x..y", "x.y", ".z", "w.", "v.1"), "2")
+    targets = list(kinds)
+    wires = {
+        f"{target}:u.x": f"{source}:y.x"
+        for target, source in zip(targets, targets[3:] + targets[:3], strict=True)
+    }
+    system = system_of(parts, kinds, wires)
+    found = [one.get("name") for one in structure(system).findall("Elements/*")]
+    assert found == ["a", "a.b", "a.b.c", "x", ".z", "w.", "v"]
+    check_same(round_trip(system), system)
+
+
+def test_arrays_cross_borders_as_a_whole(parts: dict[str, Component]):
+    whole = {f"b.{name}:u[{i}]": f"a.p:y[{i}]" for name in ("p", "q") for i in (1, 2, 3)}
+    parted = {"c.p:u[3]": "a.p:y[1]", "c.p:u[1]": "a.p:z", "a.p:x": "a.p:y[2]"}
+    system = system_of(parts, dict.fromkeys(("a.p", "b.p", "b.q", "c.p"), "3"), {**whole, **parted})
+    outer = structure(system)
+    assert lines(outer) == {
+        ("a:a_p_y", "b:a_p_y"), ("a:a_p_y", "c:a_p_y"), ("a:a_p_z", "c:a_p_z"),
+    }  # fmt: skip
+    sizes = [one.get("size") for one in outer.iterfind(".//System/Connectors/Connector/Dimension")]
+    assert sizes == ["3"] * 3
+    check_same(round_trip(system), system)
+
+
+def test_what_happens_to_a_value_on_its_way_is_read_as_it_was(parts: dict[str, Component]):
+    """In the unit of the output, also where two FMUs call different lengths a metre."""
+    made: dict[str, (Linear | Mapped)] = {
+        "b.c.p:v": Linear(0.001, 2.0), "b.c.p:n": Mapped(((1.0, 2.0),)), "a.q:u.x": Linear(),
+        "b.p:u.x": Linear(0.3048),
+    }  # fmt: skip
+    system = system_of(
+        parts,
+        {"a.p": "2", "b.c.p": "2", "b.p": "2", "a.q": "2", "b.f": "foot", "a.f": "foot"},
+        {
+            "b.c.p:v": "a.p:y.x", "b.c.p:n": "a.p:m", "a.q:u.x": "b.f:y.x", "b.p:u.x": "a.f:y.x",
+            "b.f:u.x": "a.f:y.x", "a.f:u.x": "b.f:y.x",
+        },
+        made,
+    )  # fmt: skip
+    check_same(round_trip(system), system)
+
+
+def test_parameters_steps_open_inputs_and_order_are_read_as_they_were(
+    parts: dict[str, Component],
+):
+    """The components of two systems are stated in turn."""
+    system = system_of(
+        parts,
+        {"a.p": "2", "b.p": "3", "a.q": "2", "b.in.q": "2", "a.in.q": "3"},
+        {"a.q:u.x": "a.p:y.x"},
+        parameters={
+            PortName("a.p", "k"): 2.5, PortName("b.in.q", "k"): -1.0, PortName("a.p", "n"): 3,
+            **{PortName("b.p", f"A[{i},{j}]"): 1.0 * i + j for i in (1, 2) for j in (1, 2)},
+        },
+        steps={"b.in.q": 0.5},
+        left_open={PortName("b.in.q", "v")},
+        start_time=1.0, stop_time=3.0, step=0.25,
+    )  # fmt: skip
+    check_same(round_trip(system), system)
+    # Where nesting keeps the order there is nothing to be said of it.
+    assert b"<Order" not in ssp_bytes(system_of(parts, {"a.p": "2", "a.q": "2", "b": "2"}, {}))
+
+
+@pytest.mark.parametrize("offered", [False, True])
+def test_fmpy_finds_the_schema_kept(parts: dict[str, Component], tmp_path: Path, offered: bool):
+    system = system_of(
+        parts, {"a.p": "2", "b.c.p": "2"}, {"b.c.p:u.x": "a.p:y.x"}, step=0.1, stop_time=1.0
+    )
+    [path] = write_ssp(system, tmp_path, connectors=offered)
+    top = read_ssd(str(path)).system
+    assert [element.name for element in top.elements] == ["a", "b"]
+
+
+@pytest.mark.skipif(find_spec("pyssp_standard") is None, reason="pyssp_standard is not installed")
+@pytest.mark.parametrize("offered", [False, True])
+def test_nested_ssp_2_is_valid(parts: dict[str, Component], offered: bool):
+    """Held against the schema of SSP 2.0, which that package has."""
+    found = find_spec("pyssp_standard")
+    assert found is not None and found.origin is not None
+    schema = Path(found.origin).with_name("resources") / "ssp2" / "SystemStructureDescription.xsd"
+    wires = {f"b.c.q:u[{i}]": f"a.p:y[{i}]" for i in (1, 2, 3)}
+    wires |= {"b.r:v": "a.p:z", "a.in.p:x": "b.c.q:y[2]"}
+    kinds = {"a.p": "3", "b.r": "2", "b.c.q": "3", "a.in.p": "3"}
+    made = {"b.r:v": Linear(0.001)}
+    system = system_of(parts, kinds, wires, made, step=0.1, stop_time=1.0)
+    text = structure_xml(system, connectors=offered)
+    etree.XMLSchema(etree.parse(schema)).assertValid(etree.fromstring(text))
+
+
+def test_a_system_offers_its_outputs_and_open_inputs(parts: dict[str, Component]):
+    """An array as a whole, where it is open as a whole."""
+    system = system_of(
+        parts,
+        {"a.p": "2", "b": "3", "c": "3"},
+        {"a.p:u.x": "a.p:y.x", "b:u[2]": "c:z"},
+        parameters={PortName("a.p", "n"): 3},
+        left_open={PortName("a.p", "v"), PortName("a.p", "n"), PortName("c", "x")},
+    )  # fmt: skip
+    outer = structure(system, offered=True)
+    offered = {
+        "a_p_v": "input", "b_x": "input", "b_v": "input", "c_u": "input", "c_x": "input",
+        "c_v": "input", "a_p_y_x": "output", "a_p_m": "output", "b_y": "output", "b_z": "output",
+        "c_y": "output", "c_z": "output",
+    }  # fmt: skip
+    assert dict(connectors(outer)) == offered and len(connectors(outer)) == len(offered)
+    ends = lines(outer)
+    assert {
+        (":a_p_v", "a:a_p_v"),
+        ("a:a_p_y_x", ":a_p_y_x"),
+        (":c_u", "c:u"),
+        ("c:z", ":c_z"),
+    } < ends
+    # What neither another port nor the border feeds has no connector.
+    [inner] = outer.findall(".//System/Elements/Component")
+    assert dict(connectors(inner)) == {
+        "u.x": "input", "v": "input", "y.x": "output", "m": "output", "k": "parameter",
+    }  # fmt: skip
+
+
+#: The rule of OMSimulator's `ComRef.cpp` for names of systems' connectors.
+IDENT = re.compile("[a-zA-Z][a-zA-Z0-9_-]*")
+
+NAMES = st.lists(
+    st.lists(st.sampled_from("abc"), min_size=1, max_size=4).map(".".join),
+    min_size=1, max_size=8, unique=True,
+)  # fmt: skip
+
+MADE = st.sampled_from([None, Linear(), Linear(2.0, -1.0)])
+
+
+@st.composite
+def nested_systems(draw: st.DrawFn, parts: dict[str, Component]) -> System:
+    names = draw(NAMES)
+    kinds = {name: draw(st.sampled_from(["2", "3"])) for name in names}
+    outputs = {
+        "2": [("y.x", "Real", "m"), ("m", "Integer", "")],
+        "3": [(f"y[{i}]", "Real", "") for i in (1, 2, 3)] + [("z", "Real", "")],
+    }
+    inputs = {
+        "2": [("u.x", "Real", "m"), ("v", "Real", "km"), ("n", "Integer", "")],
+        "3": [(f"u[{i}]", "Real", "") for i in (1, 2, 3)] + [("x", "Real", "")],
+    }
+    sources = [(f"{name}:{port}", *of) for name in names for port, *of in outputs[kinds[name]]]
+    wires: dict[str, str] = {}
+    made: dict[str, (Linear | Mapped)] = {}
+    for name in names:
+        for port, kind, unit in inputs[kinds[name]]:
+            fitting = [one for one in sources if one[1] == kind]
+            source = draw(st.none() | st.sampled_from(fitting)) if fitting else None
+            if source is None:
+                continue
+            target = f"{name}:{port}"
+            wires[target] = source[0]
+            change = draw(MADE) if kind == "Real" else None
+            if change is None and unit and source[2] and unit != source[2]:
+                change = Linear(0.001)
+            if change is not None:
+                made[target] = change
+    return system_of(parts, kinds, wires, made, stop_time=1.0)
+
+
+@given(st.data(), st.booleans())
+def test_random_systems_are_read_as_they_were(
+    parts: dict[str, Component], data: st.DataObject, offered: bool
+):
+    """Connectors of systems in them have names that OMSimulator takes."""
+    system = data.draw(nested_systems(parts))
+    # Ports of two components may have one name, which is refused.
+    assume(not list(system.problems()))
+    check_same(round_trip(system, offered), system)
+    outer = structure(system, offered)
+    names = [name for one in (outer, *outer.iterfind(".//System")) for name, _ in connectors(one)]
+    assert all(map(IDENT.fullmatch, names))
