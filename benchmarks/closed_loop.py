@@ -26,11 +26,10 @@ from unittest.mock import patch
 from measuring import options, python, steps_time, timed
 
 from auv_fmu.loop.closed_loop import closed_loop
-from auv_fmu.paper.euler import STEP
 from fmus.kinds import PYTHON
 from fmus.python.component import Component
 from fmus.python.state import STEPPING
-from orchestrator.cosim import Experiment, Stepping, System, choose_loop
+from orchestrator.cosim import System
 from orchestrator.cosim.fmi.instance import Instance
 from orchestrator.cosim.fmi.loaded import FMU2OfOthers
 from orchestrator.cosim.stages import Member
@@ -85,12 +84,12 @@ def master_alone(system: System, steps: int) -> float:
         return steps_time(system, steps)
 
 
-def compiled_alone(system: System, steps: int, stepping: Stepping) -> float:
+def compiled_alone(system: System, steps: int, loop: str) -> float:
     """Seconds of the steps of the compiled loop when every function it calls does nothing."""
     # One, which is FMI's warning, is all that this one has to say.
     nothing = ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value
     with patch.object(FMU2OfOthers, "address", lambda *_: nothing):
-        return steps_time(system, _TIMES * steps, stepping=stepping) / _TIMES
+        return steps_time(system, _TIMES * steps, loop=loop) / _TIMES
 
 
 def main() -> None:
@@ -99,14 +98,13 @@ def main() -> None:
     rows = []
     system = wired(current_fmus(PYTHON))
     steps_time(system, 10)
-    fast = choose_loop("compiled", Experiment(STEP, STEP))
     for _ in range(given.repetitions):
         straight = timed(lambda: deque(closed_loop(given.steps), maxlen=0))
         fmus = steps_time(system, given.steps)
         idle = without_equations(system, given.steps)
         master = master_alone(system, given.steps)
-        compiled = steps_time(system, given.steps, stepping=fast)
-        stepper = compiled_alone(system, given.steps, fast)
+        compiled = steps_time(system, given.steps, loop="compiled")
+        stepper = compiled_alone(system, given.steps, "compiled")
         rows.append((straight, fmus, idle, master, compiled, stepper))
 
     def per_step(index: int) -> float:

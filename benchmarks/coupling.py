@@ -17,7 +17,7 @@ from time import perf_counter
 
 import numpy as np
 
-from orchestrator.cosim import Experiment, System, Table, choose_loop, make_plan, simulate_plan
+from orchestrator.cosim import Experiment, System, Table, make_plan, simulate_plan
 from orchestrator.cosim.loop import compile_stepper
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
@@ -38,7 +38,7 @@ def _time(system: System, step: float, coupling: str) -> float:
     def run(n: int) -> float:
         experiment = Experiment(n * step, step, coupling=coupling)
         begin = perf_counter()
-        simulate_plan(make_plan(system, experiment), stepping=choose_loop("compiled", experiment))
+        simulate_plan(make_plan(system, experiment, loop="compiled"))
         return perf_counter() - begin
 
     return 1e6 * (run(_STEPS) - run(1)) / (_STEPS - 1)

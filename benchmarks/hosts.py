@@ -28,7 +28,6 @@ from fmus.kinds import NATIVE
 from orchestrator.cosim import (
     System,
     Table,
-    choose_loop,
     read_component,
     read_ssp,
     simulate_plan,
@@ -62,9 +61,8 @@ def ours(system: System, order: str) -> tuple[Run, float]:
     def run(steps: int) -> float:
         request = Request(stop_time=steps * step, step=step, order=order)
         prepared, table = prepare(Scenario(system.name), system, request), Table()
-        stepping = choose_loop("auto", prepared.experiment)
         start = perf_counter()
-        ending = simulate_plan(prepared.plan, [table], stepping=stepping)
+        ending = simulate_plan(prepared.plan, [table])
         seconds = perf_counter() - start
         if ending.failure is not None or len(table) != steps + 1:
             raise InputError(f"{ending.failure or ending.remark}")

@@ -21,8 +21,8 @@ from orchestrator.runs.wiring import closed_loop
 
 def start_time(system: System, order: str) -> float:
     """Seconds of a run of one step, each FMU in a process of its own."""
-    plan = make_plan(system, Experiment(STEP, STEP, order))
-    return timed(lambda: simulate_plan(plan, [Table()], Isolation()))
+    plan = make_plan(system, Experiment(STEP, STEP, order), Isolation())
+    return timed(lambda: simulate_plan(plan, [Table()]))
 
 
 def main() -> None:

@@ -28,7 +28,7 @@ from measuring import options, python, steps_time, timed
 
 from auv_fmu.loop.closed_loop import closed_loop
 from auv_fmu.paper.euler import STEP
-from orchestrator.cosim import Experiment, System, choose_loop
+from orchestrator.cosim import System
 from orchestrator.exchange.hosts.comparison import HOSTS, compare
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
@@ -72,10 +72,9 @@ def straight_line(steps: int) -> float:
 
 def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
     """Steps of a run whose rows are kept in memory, without its set-up."""
-    stepping = choose_loop(loop, Experiment(STEP, STEP, order))
     # A set-up takes as long as thousands of compiled steps, and a larger table has other costs.
     times = MORE_COMPILED if loop == "compiled" else 1
-    return sum(steps_time(system, steps, order, stepping) for _ in range(times)) / times
+    return sum(steps_time(system, steps, order, loop) for _ in range(times)) / times
 
 
 def in_another(system: System, host: str, is_read: bool, steps: int) -> float:

@@ -23,14 +23,13 @@ from auv_fmu.paper.euler import STEP
 from fmus.kinds import KINDS, NATIVE
 from orchestrator import load
 from orchestrator.cosim import (
-    LOOPS,
     Checkpoints,
     Experiment,
     Hook,
     Observer,
+    Plan,
     Run,
     Selection,
-    choose_loop,
     make_plan,
     simulate_plan,
 )
@@ -84,7 +83,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--steps", type=int, default=1_000_000)
     parser.add_argument("--kind", choices=KINDS, default=NATIVE)
-    parser.add_argument("--loop", choices=LOOPS, default=LOOPS[0])
+    parser.add_argument("--loop", choices=Plan.LOOPS, default=Plan.LOOPS[0])
     parser.add_argument("--checkpoint-every", type=float, metavar="S")
     options = parser.parse_args()
     experiment = Experiment(options.steps * STEP, STEP)
@@ -105,11 +104,7 @@ def main() -> None:
             observers.append(checkpoints)
             hooks.insert(0, checkpoints)
         simulate_plan(
-            make_plan(load("fig4", options.kind), experiment),
-            observers,
-            None,
-            choose_loop(options.loop, experiment),
-            hooks,
+            make_plan(load("fig4", options.kind), experiment, loop=options.loop), observers, hooks
         )
         sizes = {path.name: path.stat().st_size for path in folder.glob("checkpoint/*")}
     print(f"the last tenth of the first: {parts.times[-1] / parts.times[0]:.3f}")

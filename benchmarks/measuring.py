@@ -16,11 +16,9 @@ from typing import Any
 
 from auv_fmu.paper.euler import STEP
 from orchestrator.cosim import (
-    PYTHON_LOOP,
     Experiment,
     Isolation,
     Order,
-    Stepping,
     System,
     Table,
     make_plan,
@@ -55,15 +53,14 @@ def steps_time(
     system: System,
     steps: int,
     order: Order | None = None,
-    stepping: Stepping = PYTHON_LOOP,
+    loop: str = "python",
     isolation: Isolation | None = None,
 ) -> float:
     """Seconds of the steps of a run whose rows are kept in memory, without its set-up."""
 
     def run(n: int) -> None:
-        simulate_plan(
-            make_plan(system, Experiment(n * STEP, STEP, order)), [Table()], isolation, stepping
-        )
+        plan = make_plan(system, Experiment(n * STEP, STEP, order), isolation, loop)
+        simulate_plan(plan, [Table()])
 
     return timed(lambda: run(steps)) - timed(lambda: run(1))
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import NATIVE, PYTHON, KindName
-from orchestrator.cosim import Ending, Header, LoopName
+from orchestrator.cosim import Ending, Header, Plan
 from orchestrator.exchange.hosts.comparison import compare
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
@@ -42,7 +42,7 @@ VEHICLE_STEPS, FEWEST = {NATIVE: 100_000, PYTHON: 2_000}, 20
 HOSTS_BESIDE, FEW, HOST_STEPS = ("libcosim-ssp", "ecos"), (1, 10), 50_000
 
 #: Both loops, and the one that `load`, `start` and `memory` are of.
-LOOPS: tuple[LoopName, ...] = ("compiled", "python")
+LOOPS: tuple[Plan.Loop, ...] = ("compiled", "python")
 COMPILED = LOOPS[0]
 
 #: How long a process may take [s].
@@ -66,7 +66,7 @@ class Watch:
         pass
 
 
-def found(n: int, kind: KindName, loop: LoopName, steps: int) -> list[float]:
+def found(n: int, kind: KindName, loop: Plan.Loop, steps: int) -> list[float]:
     """Seconds to load and to start, microseconds of a vehicle's step, and its memory [MB]."""
     # What the first system takes, and the libraries, is there before.
     prepare(Scenario("warm"), load("fig4", kind), Request(stop_time=STEP, loop=loop)).run([Watch()])

@@ -19,7 +19,7 @@ from auv_fmu.paper.disturbance import Disturbance
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.motion_planner import TAU_D
 from auv_fmu.paper.vehicle import Vehicle
-from orchestrator.cosim import OrderName, Table
+from orchestrator.cosim import Order, Table
 from orchestrator.machine.workers import Workers, workers
 from orchestrator.paper.claims import (
     EFFORT_PD,
@@ -61,7 +61,7 @@ class Option(NamedTuple):
     text: str
     parameters: Mapping[str, Any] = {}  # nobody changes it
     against: str = ""
-    order: OrderName | None = None
+    order: Order | None = None
 
 
 _WAVES, _SIGN = Disturbance(), "(2): the sign of tau_w"

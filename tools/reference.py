@@ -36,7 +36,7 @@ from orchestrator.cosim import (
     Value,
     make_plan,
     read_component,
-    simulate_to_end,
+    simulate_plan,
 )
 from orchestrator.cosim.formats.ssp_writer import parameter_set_xml
 from orchestrator.cosim.observers import CsvFile
@@ -195,7 +195,8 @@ def write_reference(dist: Path, root: Path) -> list[Path]:
     written.append(root / REFERENCE / "auv_ref.csv")
     written[-1].parent.mkdir(exist_ok=True)
     jacobi = Experiment(STOP_TIME, STEP, "jacobi")
-    simulate_to_end(make_plan(closed_loop(dist), jacobi), [CsvFile(written[-1])])
+    plan = make_plan(closed_loop(dist), jacobi)
+    simulate_plan(plan, [CsvFile(written[-1])]).require_success(plan.system.name)
     written.append(_write_options(written[-1].with_name("auv"), SPAN))
     return written
 

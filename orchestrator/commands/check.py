@@ -12,7 +12,7 @@ from fmpy.validation import validate_fmu
 
 from orchestrator.commands.options import add_variant
 from orchestrator.commands.streams import BAD_INPUT, OK, describe, show
-from orchestrator.cosim import Component, binary_of, check_binary, read_component
+from orchestrator.cosim import Component, check_binary, read_component
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
@@ -127,8 +127,7 @@ def _fmu(options: argparse.Namespace, findings: Findings) -> list[str]:
 def _binary(component: Component, findings: Findings) -> list[str]:
     """Check the library of an FMU; returns remarks."""
     with findings.collecting():
-        check_binary(component, component.folder)
-        if not binary_of(component, component.folder).is_file():
+        if not check_binary(component):
             return ["has no binary for this machine: a run compiles its sources first"]
     return []
 

@@ -21,7 +21,7 @@ from orchestrator.commands.options import (
     read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, describe, say, show
-from orchestrator.cosim import INITIAL, Experiment, write_osp, write_ssp
+from orchestrator.cosim import Exchange, Experiment, write_osp, write_ssp
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
 from orchestrator.exchange.hosts.here import fmi_of
@@ -169,11 +169,11 @@ def add_verify(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--initial",
-        choices=INITIAL,
-        default=INITIAL[0],
+        choices=Exchange.INITIAL,
+        default=Exchange.INITIAL[0],
         help="when the tool first exchanges values: full (in initialisation mode), none (just "
         "before the first step) or zero (inputs keep their start values, or zeros, during the "
-        f"first step); default: {INITIAL[0]}",
+        f"first step); default: {Exchange.INITIAL[0]}",
     )
     parser.add_argument(
         "--verbose", action="store_true", help="name everything that was not compared"

@@ -17,7 +17,7 @@ from orchestrator.commands.options import (
     status,
 )
 from orchestrator.commands.streams import OK, describe, say, show
-from orchestrator.cosim import Observer, Progress
+from orchestrator.cosim import Observer
 from orchestrator.figures.drawing import save
 from orchestrator.figures.film import Film, animate
 from orchestrator.figures.plot import plot, told_apart, wanted_columns
@@ -26,6 +26,7 @@ from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.folder import VIEW, replace_files
 from orchestrator.runs.preparation import prepare
+from orchestrator.runs.progress import Progress
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.result import (
     METRICS,

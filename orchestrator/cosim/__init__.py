@@ -31,157 +31,71 @@ from typing import TYPE_CHECKING
 from orchestrator.machine.lazy import offered
 
 if TYPE_CHECKING:
-    from orchestrator.cosim.checkpoint import Checkpoints
-    from orchestrator.cosim.component import Component, read_component
-    from orchestrator.cosim.connection import Connection, Linear, Mapped, PortName, join_terminals
-    from orchestrator.cosim.events import (
-        Action,
-        Alter,
-        Condition,
-        Event,
-        Events,
-        Freeze,
-        Release,
-        Reset,
-        Set,
-        Stop,
-    )
-    from orchestrator.cosim.experiment import (
-        INITIAL,
-        CouplingName,
-        Exchange,
-        Experiment,
-        Order,
-        OrderName,
-    )
-    from orchestrator.cosim.fmi.binary import binary_of, check_binary, runs_python
-    from orchestrator.cosim.fmi.isolated import Isolation
-    from orchestrator.cosim.formats.archive import read_document
-    from orchestrator.cosim.formats.osp import read_osp, write_osp
-    from orchestrator.cosim.formats.ssp_reader import bind_parameter_set, read_ssp
-    from orchestrator.cosim.formats.ssp_writer import PARAMETER_SET, ssp_bytes, write_ssp
-    from orchestrator.cosim.hooks import Hook, InputTable, Playback, RealTime, Run
-    from orchestrator.cosim.loop import LOOPS, PYTHON_LOOP, LoopName, Stepping, choose_loop
-    from orchestrator.cosim.observers import (
-        TABLE_FORMATS,
-        CsvLines,
-        Ending,
-        Header,
-        Observer,
-        Occurrence,
-        Progress,
-        Selection,
-        Table,
-        TableFormat,
-        every,
-    )
-    from orchestrator.cosim.plan import Plan, make_plan
-    from orchestrator.cosim.row import FACTOR, OFFSET
-    from orchestrator.cosim.simulation import simulate_plan, simulate_to_end
-    from orchestrator.cosim.stages import Stage, Stages, Visit, stages_of, types_read
-    from orchestrator.cosim.system import System
-    from orchestrator.cosim.variables import TYPES, Standing, StringTable, Value, Variable
+    from orchestrator.cosim.checkpoint import Checkpoints as Checkpoints
+    from orchestrator.cosim.component import Component as Component
+    from orchestrator.cosim.component import read_component as read_component
+    from orchestrator.cosim.connection import Connection as Connection
+    from orchestrator.cosim.connection import Linear as Linear
+    from orchestrator.cosim.connection import Mapped as Mapped
+    from orchestrator.cosim.connection import PortName as PortName
+    from orchestrator.cosim.events import Alter as Alter
+    from orchestrator.cosim.events import Condition as Condition
+    from orchestrator.cosim.events import Event as Event
+    from orchestrator.cosim.events import Events as Events
+    from orchestrator.cosim.events import Freeze as Freeze
+    from orchestrator.cosim.events import Release as Release
+    from orchestrator.cosim.events import Reset as Reset
+    from orchestrator.cosim.events import Set as Set
+    from orchestrator.cosim.events import Stop as Stop
+    from orchestrator.cosim.experiment import Exchange as Exchange
+    from orchestrator.cosim.experiment import Experiment as Experiment
+    from orchestrator.cosim.experiment import Order as Order
+    from orchestrator.cosim.fmi.binary import check_binary as check_binary
+    from orchestrator.cosim.fmi.isolated import Isolation as Isolation
+    from orchestrator.cosim.formats.osp import read_osp as read_osp
+    from orchestrator.cosim.formats.osp import write_osp as write_osp
+    from orchestrator.cosim.formats.ssp_reader import read_parameter_set as read_parameter_set
+    from orchestrator.cosim.formats.ssp_reader import read_ssp as read_ssp
+    from orchestrator.cosim.formats.ssp_writer import write_ssp as write_ssp
+    from orchestrator.cosim.hooks import Hook as Hook
+    from orchestrator.cosim.hooks import InputTable as InputTable
+    from orchestrator.cosim.hooks import RealTime as RealTime
+    from orchestrator.cosim.hooks import Run as Run
+    from orchestrator.cosim.observers import Ending as Ending
+    from orchestrator.cosim.observers import Header as Header
+    from orchestrator.cosim.observers import Observer as Observer
+    from orchestrator.cosim.observers import Occurrence as Occurrence
+    from orchestrator.cosim.observers import Selection as Selection
+    from orchestrator.cosim.observers import Table as Table
+    from orchestrator.cosim.observers import TableFile as TableFile
+    from orchestrator.cosim.plan import Plan as Plan
+    from orchestrator.cosim.plan import make_plan as make_plan
+    from orchestrator.cosim.simulation import simulate_plan as simulate_plan
+    from orchestrator.cosim.stages import Stage as Stage
+    from orchestrator.cosim.stages import Visit as Visit
+    from orchestrator.cosim.system import System as System
+    from orchestrator.cosim.variables import Value as Value
+    from orchestrator.cosim.variables import Variable as Variable
 
-__all__ = [
-    "FACTOR",
-    "INITIAL",
-    "LOOPS",
-    "OFFSET",
-    "PARAMETER_SET",
-    "PYTHON_LOOP",
-    "TABLE_FORMATS",
-    "TYPES",
-    "Action",
-    "Alter",
-    "Checkpoints",
-    "Component",
-    "Condition",
-    "Connection",
-    "CouplingName",
-    "CsvLines",
-    "Ending",
-    "Event",
-    "Events",
-    "Exchange",
-    "Experiment",
-    "Freeze",
-    "Header",
-    "Hook",
-    "InputTable",
-    "Isolation",
-    "Linear",
-    "LoopName",
-    "Mapped",
-    "Observer",
-    "Occurrence",
-    "Order",
-    "OrderName",
-    "Plan",
-    "Playback",
-    "PortName",
-    "Progress",
-    "RealTime",
-    "Release",
-    "Reset",
-    "Run",
-    "Selection",
-    "Set",
-    "Stage",
-    "Stages",
-    "Standing",
-    "Stepping",
-    "Stop",
-    "StringTable",
-    "System",
-    "Table",
-    "TableFormat",
-    "Value",
-    "Variable",
-    "Visit",
-    "binary_of",
-    "bind_parameter_set",
-    "check_binary",
-    "choose_loop",
-    "every",
-    "join_terminals",
-    "make_plan",
-    "read_component",
-    "read_document",
-    "read_osp",
-    "read_ssp",
-    "runs_python",
-    "simulate_plan",
-    "simulate_to_end",
-    "ssp_bytes",
-    "stages_of",
-    "types_read",
-    "write_osp",
-    "write_ssp",
-]
+_MODULES = {
+    "checkpoint": "Checkpoints",
+    "component": "Component read_component",
+    "connection": "Connection Linear Mapped PortName",
+    "events": "Alter Condition Event Events Freeze Release Reset Set Stop",
+    "experiment": "Exchange Experiment Order",
+    "fmi.binary": "check_binary",
+    "fmi.isolated": "Isolation",
+    "formats.osp": "read_osp write_osp",
+    "formats.ssp_reader": "read_parameter_set read_ssp",
+    "formats.ssp_writer": "write_ssp",
+    "hooks": "Hook InputTable RealTime Run",
+    "observers": "Ending Header Observer Occurrence Selection Table TableFile",
+    "plan": "Plan make_plan",
+    "simulation": "simulate_plan",
+    "stages": "Stage Visit",
+    "system": "System",
+    "variables": "Value Variable",
+}
 
-__getattr__, __dir__ = offered(
-    __name__,
-    {
-        "experiment": "CouplingName Exchange Experiment INITIAL Order OrderName",
-        "fmi.binary": "binary_of check_binary runs_python",
-        "fmi.isolated": "Isolation",
-        "formats.osp": "read_osp write_osp",
-        "formats.archive": "read_document",
-        "formats.ssp_reader": "bind_parameter_set read_ssp",
-        "formats.ssp_writer": "PARAMETER_SET ssp_bytes write_ssp",
-        "checkpoint": "Checkpoints",
-        "events": "Action Alter Condition Event Events Freeze Release Reset Set Stop",
-        "hooks": "Hook InputTable Playback RealTime Run",
-        "loop": "LOOPS LoopName PYTHON_LOOP Stepping choose_loop",
-        "observers": "CsvLines Ending Header Observer Occurrence Progress Selection TABLE_FORMATS "
-        "Table TableFormat every",
-        "plan": "Plan make_plan",
-        "row": "FACTOR OFFSET",
-        "simulation": "simulate_plan simulate_to_end",
-        "stages": "Stage Stages Visit stages_of types_read",
-        "component": "Component read_component",
-        "connection": "Connection Linear Mapped PortName join_terminals",
-        "system": "System",
-        "variables": "Standing StringTable TYPES Value Variable",
-    },
-)
+__getattr__, __dir__ = offered(__name__, _MODULES)
+__all__ = [*" ".join(_MODULES.values()).split()]  # noqa: PLE0604

@@ -227,6 +227,11 @@ class Component:
             raise InputError(f"{self.name}: {error}") from None
 
     @property
+    def runs_python(self) -> bool:
+        """True if PythonFMU has made the FMU."""
+        return runs_python(self.folder)
+
+    @property
     def is_ours(self) -> bool:
         """Whether this program has built the FMU."""
         return (self.description.generationTool or "").startswith(_OWN)
@@ -369,6 +374,11 @@ def _feedthrough_of(description: ModelDescription) -> frozenset[str]:
     }
     variables = variables_of(description).known.values()
     return frozenset(v.name for v in variables if v.causality == "output" and v.array not in free)
+
+
+def runs_python(folder: Path) -> bool:
+    """Return True for an unpacked FMU that PythonFMU has made."""
+    return (folder / "resources" / "slavemodule.txt").is_file()
 
 
 def read_component(

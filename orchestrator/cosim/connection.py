@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from math import isfinite
 from sys import float_info
-from typing import Any, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 
@@ -73,6 +73,9 @@ class Linear:
 
     factor: float = 1.0
     offset: float = 0.0
+
+    #: Factor and offset that change no number: times one, plus minus zero keeps minus zero, too.
+    UNCHANGED: ClassVar[tuple[float, float]] = (1.0, -0.0)
 
     def __call__(self, value: float) -> float:
         """The value that arrives."""
@@ -235,6 +238,47 @@ class Connection:
     target: PortName
     transformation: Transformation | None = None
 
+    @classmethod
+    def of_terminals(
+        cls, to: Component, end: Terminal, start: Component, begin: Terminal
+    ) -> Iterator[Connection]:
+        """Connect two terminals by the rules of both: each input takes an output.
+
+        Args:
+            to, end: a component and its terminal.
+            start, begin: the other ones.
+
+        Raises:
+            InputError: the terminals do not fit.
+
+        """
+        for one, other in ((end, begin), (begin, end)):
+            if one.rule not in (*COMPLETE, BUS):
+                raise InputError(f"the matching rule {one.rule!r} of a terminal is not supported")
+            if one.flows:
+                raise InputError(f"{listed(one.flows)} of a terminal: only signals are supported")
+            missing = [member for member in one.members if member not in other.members]
+            if one.rule in COMPLETE and missing:
+                raise InputError(f"a terminal lacks the member {listed(missing)}")
+        for member in (member for member in end.members if member in begin.members):
+            targets, sources = (
+                to.elements(end.members[member]),
+                start.elements(begin.members[member]),
+            )
+            if len(targets) != len(sources):
+                raise InputError(
+                    f"{member} has {len(sources)} elements here and {len(targets)} there"
+                )
+            for target, source in zip(targets, sources, strict=True):
+                there, here = PortName(start.name, source.name), PortName(to.name, target.name)
+                match source.causality, target.causality:
+                    case "output", "input":
+                        yield cls(there, here)
+                    case "input", "output":
+                        yield cls(here, there)
+                    case first, second:
+                        raise InputError(f"{there} has causality {first}, {here} of {second}")
+
 
 def check_connection(connection: Connection, component: Callable[[str], Component]) -> None:
     """Check that the ends of a connection exist, and fit.
@@ -305,30 +349,3 @@ def _check_transformed(connection: Connection, fmi_type: str) -> None:
                     raise InputError(
                         f"{wire}: is mapped to {shown}, which FMI type {fmi_type} cannot hold"
                     )
-
-
-def join_terminals(
-    to: Component, end: Terminal, start: Component, begin: Terminal
-) -> Iterator[Connection]:
-    """The connections of two terminals, by the rules of both: each input takes an output."""
-    for one, other in ((end, begin), (begin, end)):
-        if one.rule not in (*COMPLETE, BUS):
-            raise InputError(f"the matching rule {one.rule!r} of a terminal is not supported")
-        if one.flows:
-            raise InputError(f"{listed(one.flows)} of a terminal: only signals are supported")
-        missing = [member for member in one.members if member not in other.members]
-        if one.rule in COMPLETE and missing:
-            raise InputError(f"a terminal lacks the member {listed(missing)}")
-    for member in (member for member in end.members if member in begin.members):
-        targets, sources = to.elements(end.members[member]), start.elements(begin.members[member])
-        if len(targets) != len(sources):
-            raise InputError(f"{member} has {len(sources)} elements here and {len(targets)} there")
-        for target, source in zip(targets, sources, strict=True):
-            there, here = PortName(start.name, source.name), PortName(to.name, target.name)
-            match source.causality, target.causality:
-                case "output", "input":
-                    yield Connection(there, here)
-                case "input", "output":
-                    yield Connection(here, there)
-                case first, second:
-                    raise InputError(f"{there} has causality {first}, {here} of {second}")

@@ -32,7 +32,6 @@ from orchestrator.cosim.stages import (
     arrange,
     link_stages,
     member,
-    stages_of,
     step_members,
 )
 from orchestrator.cosim.system import System
@@ -233,9 +232,7 @@ class Coupling:
             steps = _LinearSteps(system, instances, row, settling)
             stage = LinkedStage(Gathering.along(row, ()), [StageCall(steps.step).member])
             return Stages([stage]), settling.gatherings
-        by_names = stages_of(
-            system, self.plan.arrangement, self.plan.decimations, latest=bool(self._exchange.groups)
-        )
+        by_names = self.plan.stages(latest=bool(self._exchange.groups))
         stages = link_stages(by_names, system, instances, row, self._solved)
         gatherings = [stage.gather for stage in (*(stages.passing or ()), *stages.stepping)]
         own = [gather for ring in self._solved for gather in ring.gatherings]

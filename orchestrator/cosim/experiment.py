@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from math import ceil, floor, isfinite, ulp
 from numbers import Real
-from typing import ClassVar, Literal, NamedTuple, TypeAlias, cast, get_args
+from typing import ClassVar, Literal, TypeAlias, cast, get_args
 
 from orchestrator.machine.errors import InputError
 
@@ -18,15 +18,6 @@ OrderName: TypeAlias = Literal["feedthrough", "gauss-seidel", "jacobi"]
 #: One of these, or the names of all components, one stepped after the other.
 Order: TypeAlias = OrderName | list[str] | tuple[str, ...]
 
-#: What components have at their inputs in the first step: outputs that were exchanged in
-#: initialisation mode, outputs that were exchanged after it, or start values and zeros. The first
-#: is what we do.
-INITIAL = FULL, NONE, ZERO = "full", "none", "zero"
-
-#: How rings of direct feedthroughs are closed: solved, opened by a delay of a step, or solved with
-#: inputs that change linearly from one communication point to the next.
-CouplingName: TypeAlias = Literal["solve", "delay", "linear"]
-
 #: A rest of a run that is shorter than this share of a step is a rounding error.
 _MOST_OF_A_STEP = 1e-3
 
@@ -34,22 +25,29 @@ _MOST_OF_A_STEP = 1e-3
 MOST_STEPS = 1_000_000_000
 
 
-class Exchange(NamedTuple):
-    """How values are exchanged; not every tool does it as we do, which is the default.
+@dataclass(frozen=True)
+class Exchange:
+    """The exchange of values between components; the default is ours, other tools differ.
 
     Attributes:
-        initial: one of :data:`INITIAL`.
+        initial: one of `INITIAL`.
         groups: all components, those of a group stepped side by side; each group takes all outputs
             of the groups before it as they have just computed them, not only what follows directly
             from their inputs, and rings are delayed. Empty: as the experiment has it.
 
     """
 
-    initial: str = FULL
+    initial: str = "full"
     groups: Sequence[Sequence[str]] = ()
 
+    #: Inputs of components in the first step: outputs that were exchanged in initialisation mode
+    #: (ours), outputs that were exchanged after it, or start values and zeros.
+    INITIAL: ClassVar[tuple[str, ...]] = ("full", "none", "zero")
 
-#: As we do it.
+
+FULL, NONE, ZERO = Exchange.INITIAL
+
+#: The default.
 OURS = Exchange()
 
 
@@ -75,9 +73,13 @@ class Experiment:
     start_time: float = 0.0
     coupling: str | None = None
 
+    #: Ways to close rings of direct feedthroughs: solve them, open them by a delay of a step, or
+    #: solve them with inputs that change linearly from one communication point to the next.
+    Coupling = Literal["solve", "delay", "linear"]
+
     #: Names that an order and a coupling may have.
     ORDERS: ClassVar[tuple[OrderName, ...]] = get_args(OrderName)
-    COUPLINGS: ClassVar[tuple[CouplingName, ...]] = get_args(CouplingName)
+    COUPLINGS: ClassVar[tuple[Coupling, ...]] = get_args(Coupling)
 
     #: A difference of times that is smaller than this share of them is a rounding error.
     ROUNDING: ClassVar[float] = 1e-9

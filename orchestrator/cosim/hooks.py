@@ -229,6 +229,10 @@ class InputTable:
             between[place] = column[row].item()
         return between
 
+    def playback(self) -> Playback:
+        """Return a hook that supplies the inputs with these values."""
+        return Playback(self)
+
     @cached_property
     def _is_steep(self) -> bool:
         """Whether two values that follow each other lie farther apart than any number is large."""

@@ -10,7 +10,7 @@ from contextlib import suppress
 from ctypes import CDLL, POINTER, Structure, c_double, c_int, c_size_t, c_void_p
 from functools import cache, partial
 from pathlib import Path
-from typing import Literal, NamedTuple, Protocol, TypeAlias, get_args
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from fmpy import platform_tuple
@@ -32,10 +32,6 @@ from orchestrator.machine.compilers import (
     own_compiler,
 )
 from orchestrator.machine.errors import InputError, reason
-
-#: Loops that can be asked for; the first is the default.
-LoopName: TypeAlias = Literal["auto", "python", "compiled"]
-LOOPS: tuple[LoopName, ...] = get_args(LoopName)
 
 #: To set the compiled loop up takes as long as so many steps in Python, and to compile it as long
 #: as so many.
@@ -286,16 +282,14 @@ def choose_loop(
     """Choose the loop for a run.
 
     Args:
-        wanted: one of :data:`LOOPS`.
+        wanted: `auto`, `python` or `compiled`.
         experiment: to be run.
         isolation: of the FMUs: none of their calls is then a function of this process.
 
     Raises:
-        InputError: there is no such loop, or the compiled one cannot be had.
+        InputError: the compiled loop cannot be had.
 
     """
-    if wanted not in LOOPS:
-        raise InputError(f"loop {wanted!r}: use one of {', '.join(LOOPS)}")
     if wanted == "compiled":
         if isolation:
             raise InputError(

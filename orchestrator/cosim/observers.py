@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from ctypes import Structure, c_size_t, c_void_p
@@ -17,23 +18,19 @@ from importlib import import_module
 from io import BufferedWriter, RawIOBase, StringIO
 from pathlib import Path
 from time import monotonic
-from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, get_args
 
 import numpy as np
 
 from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.experiment import Experiment
-from orchestrator.cosim.variables import Standing, as_float32
+from orchestrator.cosim.variables import TYPES, Standing, StringTable, as_float32
 from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
 from orchestrator.machine.operating_system import is_still
 from orchestrator.machine.parquet import ROWS_AT_ONCE, parquet
-from orchestrator.machine.progress import progress_bar
 
 #: Rows in a block, and the longest time until observers are told of them [s].
 _ROWS, _PATIENCE = 512, 0.2
-
-#: How long a run takes at least for a progress bar to appear [s].
-_BAR_DELAY = 2.0
 
 
 @dataclass(frozen=True)
@@ -45,8 +42,9 @@ class Header:
         experiment: that is run.
         parameters: of all components, as the FMUs reported them after initialisation.
         loop: which one makes the steps, `python` or `compiled`: the rows are the same.
-        standing: what numbers in the rows stand for, by the columns that have them.
+        types: FMI types of the columns that do not hold doubles, all of them in `TYPES`.
         units: of the columns that have one, as the FMUs write them.
+        strings: the texts and large integers that numbers in these columns stand for.
 
     """
 
@@ -54,8 +52,12 @@ class Header:
     experiment: Experiment
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     loop: str = field(default="python", compare=False)
-    standing: Mapping[str, Standing] = field(default_factory=dict, compare=False)
+    types: Mapping[str, str] = field(default_factory=dict, compare=False)
     units: Mapping[str, str] = field(default_factory=dict, compare=False)
+    strings: StringTable = field(default_factory=StringTable, compare=False, repr=False)
+
+    #: Types whose values are not all doubles: texts, and integers of 64 bits.
+    TYPES: ClassVar[frozenset[str]] = frozenset(name for name, of in TYPES.items() if of.stands)
 
     @cached_property
     def place(self) -> Mapping[str, int]:
@@ -70,13 +72,44 @@ class Header:
     @property
     def numeric_columns(self) -> tuple[str, ...]:
         """The columns that do not hold texts."""
-        texts = {name for name, one in self.standing.items() if one.c_type is None}
-        return tuple(name for name in self.columns if name not in texts)
+        return tuple(name for name in self.columns if self.types.get(name) != "String")
 
-    def places(self) -> list[tuple[int, Standing]]:
-        """Where these are in a row, time first, and what their numbers stand for."""
-        names = enumerate(self.columns, start=1)
-        return [(i, self.standing[name]) for i, name in names if name in self.standing]
+    def values(self, column: str, rows: np.ndarray) -> np.ndarray:
+        """Return a column of some rows: texts of a String, integers of 64 bits, else doubles."""
+        numbers = rows[:, self.place[column]]
+        standing = self.standing.get(column)
+        return numbers if standing is None else standing.values(numbers)
+
+    def numeric(self, rows: np.ndarray) -> np.ndarray:
+        """Return the numeric columns of some rows, time first, all as doubles."""
+        if not self.standing:
+            return rows
+        found = rows[:, [0, *(self.place[name] for name in self.numeric_columns)]]
+        for i, name in enumerate(self.numeric_columns, 1):
+            if name in self.standing:
+                found[:, i] = self.values(name, rows)
+        return found
+
+    @property
+    def encoders(self) -> dict[str, Callable[[Any], float]]:
+        """Functions that put values, or texts of them, into rows, by the columns that need one."""
+        return {name: standing.number for name, standing in self.standing.items()}
+
+    def every(self, interval: float | None) -> Every | None:
+        """Return what chooses the times of the run for an interval [s]; None: all are kept."""
+        # An interval that is no longer than the step keeps all.
+        if interval is None or interval <= self.experiment.step:
+            return None
+        return Every(interval, self.experiment.start_time)
+
+    @cached_property
+    def standing(self) -> dict[str, Standing]:
+        """What numbers in the rows stand for, by the columns that need it."""
+        return {
+            name: Standing(self.types[name], self.strings)
+            for name in self.columns
+            if name in self.types
+        }
 
 
 class Occurrence(NamedTuple):
@@ -119,6 +152,22 @@ class Ending:
     messages: tuple[str, ...] = ()
     interrupts: tuple[int, ...] = ()
     events: tuple[Occurrence, ...] = ()
+
+    def require_success(self, name: str) -> None:
+        """Refuse a run that has not come to its end.
+
+        Args:
+            name: of the system, for the message.
+
+        Raises:
+            InputError: it has failed.
+            KeyboardInterrupt: a signal has come to stop it.
+
+        """
+        if self.interrupts:
+            raise KeyboardInterrupt
+        if self.failure is not None:
+            raise InputError(f"{name} {self.failure}")
 
 
 class NotKept(Exception):
@@ -248,14 +297,6 @@ class Every:
         return grown
 
 
-def every(interval: float | None, header: Header) -> Every | None:
-    """What chooses the times of a run for an interval [s]; None: all are kept."""
-    # An interval that is no longer than the step keeps all.
-    if interval is None or interval <= header.experiment.step:
-        return None
-    return Every(interval, header.experiment.start_time)
-
-
 class Selection:
     """An observer that hands on a part of the rows and columns to another."""
 
@@ -293,7 +334,7 @@ class Selection:
     def begin(self, header: Header) -> None:
         """Find out where the columns are."""
         kept = header.columns if self._columns is None else tuple(self._columns)
-        self._every = every(self._interval, header)
+        self._every = header.every(self._interval)
         self._places = [0, *(header.place[name] for name in kept)]
         self._observer.begin(replace(header, columns=kept))
 
@@ -314,34 +355,6 @@ class Selection:
         if len(self._last):
             self._observer.take(self._last)
         self._observer.end(ending)
-
-
-class Progress:
-    """An observer that shows how far a run has come, in simulated seconds, on a terminal."""
-
-    def __init__(self, name: str) -> None:
-        """Show the name of the run in front of the bar."""
-        self._name = name
-
-    def begin(self, header: Header) -> None:
-        """Start the clock."""
-        self._start = header.experiment.start_time
-        self._bar: Any = progress_bar(
-            total=header.experiment.stop_time - header.experiment.start_time,
-            desc=self._name,
-            unit="s",
-            delay=_BAR_DELAY,
-            disable=None,
-            bar_format="{l_bar}{bar}| {n:.0f}/{total:.0f} s [{elapsed}<{remaining}]",
-        )
-
-    def take(self, rows: np.ndarray) -> None:
-        """Move on to the time of the last row."""
-        self._bar.update(rows[-1, 0] - self._start - self._bar.n)
-
-    def end(self, ending: Ending) -> None:
-        """Leave the bar where it is."""
-        self._bar.close()
 
 
 #: More rows than this are not kept in memory.
@@ -426,9 +439,7 @@ class Table:
             return self.time
         if column not in self.header.place:
             raise KeyError(f"no column {column!r}{did_you_mean(str(column), self.header.place)}")
-        values = self.rows[:, self.header.place[column]]
-        standing = self.header.standing.get(column)
-        return values if standing is None else standing.values(values)
+        return self.header.values(column, self.rows)
 
     @property
     def rows(self) -> np.ndarray:
@@ -571,21 +582,68 @@ class _Output(RawIOBase):
         return os.open(self._path, os.O_WRONLY | getattr(os, "O_BINARY", 0) | flags, 0o666)
 
 
-class CsvLines:
-    """A file of CSV that ends with a whole line, whenever and however writing ends."""
+class TableFile(ABC):
+    """An observer that writes the rows of a run into a file."""
 
-    def __init__(self, path: Path, names: Sequence[str]) -> None:
+    #: Formats, which are also the endings of the files.
+    Format = Literal["csv", "parquet"]
+    FORMATS: ClassVar[tuple[Format, ...]] = get_args(Format)
+
+    def __init__(self, path: Path) -> None:
+        """Write into a file, which is made when the run begins."""
+        self._path = path
+
+    @staticmethod
+    def at(path: Path) -> TableFile:
+        """Return the observer that writes a file: Parquet by that ending, else CSV.
+
+        Raises:
+            InputError: it takes pyarrow, which is not installed.
+
+        """
+        return ParquetFile(path) if path.suffix == ".parquet" else CsvFile(path)
+
+    @abstractmethod
+    def begin(self, header: Header) -> None:
+        """Make the file, with the names of its columns."""
+
+    @abstractmethod
+    def take(self, rows: np.ndarray) -> None:
+        """Write some rows."""
+
+    @abstractmethod
+    def end(self, ending: Ending) -> None:
+        """Close the file."""
+
+
+class CsvFile(TableFile):
+    """An observer that writes CSV, whose file ends with a whole line even where writing fails."""
+
+    def begin(self, header: Header) -> None:
         """Make the file and write the names of its columns."""
-        self._file = _Output(path)
-        self.write([names])
+        self._header = header
+        self._file = _Output(self._path)
+        self._write([("time", *header.columns)])
 
-    def write(self, lines: Sequence[Sequence[object]]) -> None:
-        """Write some lines, numbers so that they read back exactly.
+    def take(self, rows: np.ndarray) -> None:
+        """Write some rows, numbers so that they read back exactly.
 
         Raises:
             OSError: not all of them could be written; those that could are there.
 
         """
+        lines = rows.tolist()
+        for name in self._header.standing:
+            place = self._header.place[name]
+            for line, value in zip(lines, self._header.values(name, rows).tolist(), strict=True):
+                line[place] = value
+        self._write(lines)
+
+    def end(self, ending: Ending) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def _write(self, lines: Sequence[Sequence[object]]) -> None:
         self._file.check_place()
         text = _in_csv(lines)
         if "\r" in text:
@@ -600,10 +658,6 @@ class CsvLines:
             self._file.truncate(begin + content.rfind(b"\n", 0, n) + 1)
             raise
 
-    def close(self) -> None:
-        """Close the file."""
-        self._file.close()
-
 
 def _in_csv(lines: Sequence[Sequence[object]], quoting: Any = csv.QUOTE_MINIMAL) -> str:
     text = StringIO(newline="")
@@ -611,32 +665,7 @@ def _in_csv(lines: Sequence[Sequence[object]], quoting: Any = csv.QUOTE_MINIMAL)
     return text.getvalue()
 
 
-class CsvFile:
-    """An observer that writes CSV; numbers are written so that they read back exactly."""
-
-    def __init__(self, path: Path) -> None:
-        """Write into a file, which is made when the run begins."""
-        self._path = path
-
-    def begin(self, header: Header) -> None:
-        """Write the names of the columns."""
-        self._lines = CsvLines(self._path, ("time", *header.columns))
-        self._standing = header.places()
-
-    def take(self, rows: np.ndarray) -> None:
-        """Write some rows."""
-        lines = rows.tolist()
-        for place, standing in self._standing:
-            for line, value in zip(lines, standing.values(rows[:, place]).tolist(), strict=True):
-                line[place] = value
-        self._lines.write(lines)
-
-    def end(self, ending: Ending) -> None:
-        """Close the file."""
-        self._lines.close()
-
-
-class ParquetFile:
+class ParquetFile(TableFile):
     """An observer that writes Apache Parquet: doubles, texts, and integers of 64 bits.
 
     Without what is written last, nothing of such a file can be read: there is always room for that,
@@ -650,16 +679,16 @@ class ParquetFile:
             InputError: pyarrow is not installed.
 
         """
+        super().__init__(path)
         self._parquet = parquet()
-        self._path = path
 
     def begin(self, header: Header) -> None:
         """Make the file and its schema."""
         self._arrow: Any = import_module("pyarrow")
-        self._standing = header.places()
+        self._header = header
         kinds = [self._arrow.float64()] * (1 + len(header.columns))
-        for place, standing in self._standing:
-            kinds[place] = (
+        for name, standing in header.standing.items():
+            kinds[header.place[name]] = (
                 self._arrow.string()
                 if standing.c_type is None
                 else self._arrow.from_numpy_dtype(np.dtype(standing.c_type))
@@ -692,8 +721,8 @@ class ParquetFile:
 
     def _write(self, rows: np.ndarray) -> None:
         columns = [self._arrow.array(column) for column in rows.T]
-        for place, standing in self._standing:
-            values = standing.values(rows[:, place])
+        for name in self._header.standing:
+            place, values = self._header.place[name], self._header.values(name, rows)
             columns[place] = self._arrow.array(values, self._schema.types[place])
         self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
         self._n += 1
@@ -711,11 +740,3 @@ class ParquetFile:
             columns = len(self._schema)
             needed = columns * (self._room * _BYTES + (self._n + 2) * _CHUNK_BYTES)
             os.posix_fallocate(self._file.fileno(), self._file.tell(), needed)
-
-
-#: Writers by the ending of their files.
-TableFormat: TypeAlias = Literal["csv", "parquet"]
-TABLE_FORMATS: dict[TableFormat, type[CsvFile] | type[ParquetFile]] = {
-    "csv": CsvFile,
-    "parquet": ParquetFile,
-}

@@ -7,9 +7,12 @@ from dataclasses import dataclass, replace
 from importlib.metadata import version
 from math import lcm
 from platform import python_version
+from typing import ClassVar, Literal, get_args
 
 from orchestrator.cosim.experiment import FEEDTHROUGH, LINEAR, Experiment
-from orchestrator.cosim.stages import Arrangement, arrange
+from orchestrator.cosim.fmi.isolated import Isolation
+from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.stages import Arrangement, Stage, Stages, arrange, stages_of
 from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import PACKAGES, Identity, code_of
@@ -27,6 +30,8 @@ class Plan:
         arrangement: of its components where all rings are solved; once they are initialised, the
             one that is taken.
         remarks: lines for the user of a run.
+        isolation: runs each FMU in a separate process; None: all run in this one.
+        loop: makes the steps, one of `LOOPS`; the rows are the same.
 
     """
 
@@ -36,6 +41,21 @@ class Plan:
     rings: Sequence[Sequence[str]]
     arrangement: Arrangement
     remarks: Sequence[str] = ()
+    isolation: Isolation | None = None
+    loop: str = "python"
+
+    #: Loops that can be asked for; the first takes the compiled one where it is available.
+    Loop = Literal["auto", "python", "compiled"]
+    LOOPS: ClassVar[tuple[Loop, ...]] = get_args(Loop)
+
+    def stages(self, *, latest: bool = False) -> Stages[Stage]:
+        """Return the stages of every step.
+
+        Args:
+            latest: if set, stages take all that those before them have computed.
+
+        """
+        return stages_of(self.system, self.arrangement, self.decimations, latest=latest)
 
     def identity(self, events: Sequence[object] = (), inputs: str = "") -> Identity:
         """Everything that decides the rows of a run.
@@ -71,15 +91,29 @@ class Plan:
         }
 
 
-def make_plan(system: System, experiment: Experiment) -> Plan:
+def make_plan(
+    system: System,
+    experiment: Experiment,
+    isolation: Isolation | None = None,
+    loop: str = "python",
+) -> Plan:
     """Check what can be checked before an FMU is loaded.
 
     Where an FMU takes steps of one length only, a last, shorter step is left out.
 
+    Args:
+        system: that is run.
+        experiment: times, step, order and coupling.
+        isolation: runs each FMU in a separate process; None: all run in this one.
+        loop: makes the steps, one of :attr:`Plan.LOOPS`.
+
     Raises:
-        InputError: the system or its steps are not usable, or no step is left.
+        InputError: the system or its steps are not usable, no step is left, or there is no such
+            loop.
 
     """
+    if loop not in Plan.LOOPS:
+        raise InputError(f"loop {loop!r}: use one of {', '.join(Plan.LOOPS)}")
     system.check()
     system.check_order(experiment.order)
     if experiment.coupling == LINEAR:
@@ -96,7 +130,8 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
     period = lcm(*(every[name] for name in rigid))
     whole = experiment.full_steps // period * period
     if not rigid or whole == experiment.rows - 1:
-        return Plan(system, experiment, every, closed, arrangement, remarks)
+        choose_loop(loop, experiment, isolation)
+        return Plan(system, experiment, every, closed, arrangement, remarks, isolation, loop)
     why = f"{', '.join(rigid)}: takes only steps of a fixed length, so"
     if whole == 0:
         shortest = period * experiment.step
@@ -104,7 +139,8 @@ def make_plan(system: System, experiment: Experiment) -> Plan:
     end = experiment.time(whole)
     remark = f"{why} the run ends with the last whole step, at t = {end:.12g} s"
     shorter = replace(experiment, stop_time=end)
-    return Plan(system, shorter, every, closed, arrangement, (*remarks, remark))
+    choose_loop(loop, shorter, isolation)
+    return Plan(system, shorter, every, closed, arrangement, (*remarks, remark), isolation, loop)
 
 
 def _check_linear(system: System) -> None:

@@ -25,8 +25,7 @@ from orchestrator.cosim.variables import (
 #: A change so small, or so small a share of the value, is a rounding error.
 _ROUNDING = 1e-12
 
-#: Times one, plus minus zero: every number stays what it is, minus zero, too.
-FACTOR, OFFSET = 1.0, -0.0
+FACTOR, OFFSET = Linear.UNCHANGED
 
 
 class Row:

@@ -12,10 +12,10 @@ from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.coupling import Coupling
 from orchestrator.cosim.experiment import OURS, Exchange
 from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Instance, Log
-from orchestrator.cosim.fmi.isolated import Isolation, place_instances
+from orchestrator.cosim.fmi.isolated import place_instances
 from orchestrator.cosim.fmi.surroundings import Surroundings, default_mode
 from orchestrator.cosim.hooks import Hook, Hooks, Run
-from orchestrator.cosim.loop import PYTHON_LOOP, Stepping
+from orchestrator.cosim.loop import PYTHON_LOOP, Stepping, choose_loop
 from orchestrator.cosim.observers import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.cosim.plan import Plan
 from orchestrator.cosim.row import Overrides, Row
@@ -32,8 +32,6 @@ from orchestrator.machine.texts import literal
 def simulate_plan(
     plan: Plan,
     observers: Sequence[Observer] = (),
-    isolation: Isolation | None = None,
-    stepping: Stepping = PYTHON_LOOP,
     hooks: Sequence[Hook] = (),
     exchange: Exchange = OURS,
 ) -> Ending:
@@ -42,9 +40,7 @@ def simulate_plan(
     Args:
         plan: what to run, as :func:`.plan.make_plan` gives it.
         observers: take the rows.
-        isolation: run each FMU in a separate process; None: all in this one.
-        stepping: how its steps are made.
-        hooks: act between them, in this order.
+        hooks: act between the steps, in this order.
         exchange: of values.
 
     Returns:
@@ -56,6 +52,7 @@ def simulate_plan(
 
     """
     system, experiment = plan.system, plan.experiment
+    stepping = choose_loop(plan.loop, experiment, plan.isolation)
     slow = {name for name, n in plan.decimations.items() if n > 1}
     log = Log()
     for line in plan.remarks:
@@ -63,7 +60,7 @@ def simulate_plan(
     with held_interrupts() as interrupts, Surroundings() as surroundings, ExitStack() as stack:
         with _explained():
             instances = stack.enter_context(
-                place_instances(system.components, log, isolation, interrupts)
+                place_instances(system.components, log, plan.isolation, interrupts)
             )
             # Before their processes are ended: a copy must not do that for the process itself.
             stack.enter_context(surroundings)
@@ -77,8 +74,9 @@ def simulate_plan(
                 experiment,
                 _parameters(system, instances, log),
                 stepping.name,
-                {str(port): standing for port, standing in row.standing.items()},
+                {str(port): standing.fmi_type for port, standing in row.standing.items()},
                 _units(system, row.columns),
+                row.strings,
             )
         (stages, passing), gatherings = coupling.stages()
         with _observed(header, observers, surroundings) as tell:
@@ -110,26 +108,6 @@ def simulate_plan(
             )
             tell(ending)
         return ending
-
-
-def simulate_to_end(
-    plan: Plan,
-    observers: Sequence[Observer] = (),
-    exchange: Exchange = OURS,
-    hooks: Sequence[Hook] = (),
-) -> None:
-    """Run a system of which nothing less than all rows will do.
-
-    Raises:
-        InputError: it cannot be run, or not to its end.
-        KeyboardInterrupt: a signal has come to stop it.
-
-    """
-    ending = simulate_plan(plan, observers, hooks=hooks, exchange=exchange)
-    if ending.interrupts:
-        raise KeyboardInterrupt
-    if ending.failure is not None:
-        raise InputError(f"{plan.system.name} {ending.failure}")
 
 
 def _possible_stepping(stepping: Stepping, instances: Mapping[str, Instance], log: Log) -> Stepping:

@@ -169,27 +169,6 @@ def gathered_connections(
     return gathered
 
 
-def types_read(reads: Reads, component: Component, outputs: Iterable[str]) -> set[str]:
-    """The types of FMI whose outputs are read, as a call reads all outputs of a type.
-
-    Args:
-        reads: which outputs are wanted. One is enough to read a type; if those with feedthrough are
-            read elsewhere, it must have none.
-        component: whose outputs they are.
-        outputs: names of them.
-
-    """
-    feedthroughs: dict[str, set[bool]] = {}
-    for name in outputs:
-        direct = component.has_feedthrough(name)
-        feedthroughs.setdefault(component.variables[name].type, set()).add(direct)
-    if reads == ALL:
-        return {*feedthroughs}
-    if reads == ONLY_STATES:
-        return {fmi_type for fmi_type, direct in feedthroughs.items() if direct == {False}}
-    return {fmi_type for fmi_type, direct in feedthroughs.items() if (reads == DIRECT) in direct}
-
-
 class Visit(NamedTuple):
     """The work of a component in a stage.
 
@@ -205,6 +184,28 @@ class Visit(NamedTuple):
     takes: bool = True
     steps: bool = True
     reads: Reads = ALL
+
+    def types_read(self, component: Component, outputs: Iterable[str]) -> set[str]:
+        """Return the FMI types whose outputs are read: one call reads all outputs of a type.
+
+        One wanted output is enough to read a type. States that are read apart from outputs with
+        feedthrough must not share their type with any of these.
+
+        Args:
+            component: the one that is visited.
+            outputs: names of its outputs.
+
+        """
+        feedthroughs: dict[str, set[bool]] = {}
+        for name in outputs:
+            direct = component.has_feedthrough(name)
+            feedthroughs.setdefault(component.variables[name].type, set()).add(direct)
+        if self.reads == ALL:
+            return {*feedthroughs}
+        if self.reads == ONLY_STATES:
+            return {fmi_type for fmi_type, direct in feedthroughs.items() if direct == {False}}
+        wanted = self.reads == DIRECT
+        return {fmi_type for fmi_type, direct in feedthroughs.items() if wanted in direct}
 
 
 class Close(NamedTuple):
@@ -244,6 +245,7 @@ class Stage(NamedTuple):
     Attributes:
         connections: along which inputs take their values at the same time.
         visits: of components, which may run side by side until their outputs are read.
+        closings: of rings; a stage with any has no visits.
         shows: outputs whose hidden values are copied into their columns; there are no connections
             then.
         decimation: in which communication steps; None: in all of them.
@@ -251,14 +253,15 @@ class Stage(NamedTuple):
     """
 
     connections: Sequence[Connection] = ()
-    visits: Sequence[Visit | Close] = ()
+    visits: Sequence[Visit] = ()
+    closings: Sequence[Close] = ()
     shows: Sequence[PortName] = ()
     decimation: Decimation | None = None
 
     @property
     def acts(self) -> bool:
         """True where there is anything to do."""
-        return bool(self.connections or self.visits or self.shows)
+        return bool(self.connections or self.visits or self.closings or self.shows)
 
 
 class Stages(NamedTuple, Generic[AnyStage]):
@@ -305,9 +308,12 @@ def stages_of(
         here = [ring_of[name] for name in names if name in ring_of]
         if here:
             # All are stepped before one takes what another has come to.
-            stepping += [Stage(taken, [Close(ring, CHECK) for ring in here]), Stage(visits=fast)]
+            stepping += [
+                Stage(taken, closings=[Close(ring, CHECK) for ring in here]),
+                Stage(visits=fast),
+            ]
             if order != JACOBI:
-                stepping.append(Stage(visits=[Close(ring, RENEW_ALWAYS) for ring in here]))
+                stepping.append(Stage(closings=[Close(ring, RENEW_ALWAYS) for ring in here]))
         else:
             stepping.append(Stage(taken, fast))
         for name in names:
@@ -318,7 +324,7 @@ def stages_of(
                     Stage(shows=early, decimation=Decimation(n)),
                 ]
                 shown.append(Stage(shows=later, decimation=Decimation(n, at_end=True)))
-    renewed = [Stage(visits=[Close(ring, RENEW)]) for ring in rings]
+    renewed = [Stage(closings=[Close(ring, RENEW)]) for ring in rings]
     return Stages(_acting(stepping + shown + renewed))
 
 
@@ -359,7 +365,9 @@ def _passing_first(
                     Stage(shows=direct[name], decimation=Decimation(n)),
                 ]
         passing += [
-            Stage(visits=[Close(ring_of[name], RENEW_ALWAYS)]) for name in names if name in ring_of
+            Stage(closings=[Close(ring_of[name], RENEW_ALWAYS)])
+            for name in names
+            if name in ring_of
         ]
     place = {name: i for i, names in enumerate(arrangement.stages) for name in names}
     # An output that is read when values pass is read after a step too if something takes it before.
@@ -505,10 +513,11 @@ def link_stages(
     """
     ring_of = {ring.names[0]: ring for ring in rings}
 
-    def linked(visit: Visit | Close) -> Member:
-        if isinstance(visit, Close):
-            close, ring = _CLOSES[visit.how], ring_of[visit.ring[0]]
-            return StageCall(lambda _t, _h: close(ring)).member
+    def closing(of: Close) -> Member:
+        close, ring = _CLOSES[of.how], ring_of[of.ring[0]]
+        return StageCall(lambda _t, _h: close(ring)).member
+
+    def visiting(visit: Visit) -> Member:
         return _visiting(visit, instances[visit.component], system.components[visit.component])
 
     def all_linked(some: Sequence[Stage]) -> list[LinkedStage]:
@@ -517,7 +526,7 @@ def link_stages(
                 Gathering(*row.hidden(stage.shows))
                 if stage.shows
                 else Gathering.along(row, stage.connections),
-                list(map(linked, stage.visits)),
+                [*map(visiting, stage.visits), *map(closing, stage.closings)],
                 stage.decimation,
             )
             for stage in some
@@ -537,20 +546,21 @@ def _visiting(visit: Visit, instance: Instance, component: Component) -> Member:
     return Member(
         instance.set_inputs if visit.takes else [],
         instance.do_step if visit.steps else instance.do_exchange,
-        _reading(visit.reads, instance, component),
+        _reading(visit, instance, component),
         instance,
     )
 
 
-def _reading(reads: Reads, instance: Instance, component: Component) -> list[Callable[[], int]]:
-    """The calls that read some outputs of a component, each all of a type."""
+def _reading(visit: Visit, instance: Instance, component: Component) -> list[Callable[[], int]]:
+    """Return the calls that read outputs of a component, one for each type."""
     # The answer of another process has to be taken.
-    if reads == ALL or not instance.is_here:
+    if visit.reads == ALL or not instance.is_here:
         return instance.get_outputs
     outputs = component.having("output")
     types = [fmi_type for fmi_type in TYPES if any(one.type == fmi_type for one in outputs)]
-    wanted = types_read(reads, component, (one.name for one in outputs))
-    return [call for call, of in zip(instance.get_outputs, types, strict=True) if of in wanted]
+    wanted = visit.types_read(component, (one.name for one in outputs))
+    calls = zip(instance.get_outputs, types, strict=True)
+    return [call for call, fmi_type in calls if fmi_type in wanted]
 
 
 def make_stages(

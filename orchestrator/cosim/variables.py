@@ -17,7 +17,15 @@ import numpy as np
 from fmpy.model_description import ModelDescription, ModelVariable
 
 from orchestrator.machine.errors import InputError, shortened
-from orchestrator.machine.texts import BOOLEANS, finite, integer, real, transferable, whole
+from orchestrator.machine.texts import (
+    BOOLEANS,
+    finite,
+    integer,
+    is_finite,
+    real,
+    transferable,
+    whole,
+)
 
 #: A value in the type of its variable.
 Value: TypeAlias = float | int | bool | str
@@ -347,6 +355,26 @@ class Variable(NamedTuple):
             raise InputError(f"{name}{shown}: must be at most {_written(upper)}")
         # The value that the FMU will hold.
         return ctypes.c_float(number).value if self.type == "Float32" else number
+
+    def difference(self, value: Any, name: str) -> float:
+        """Check a value that is added to the variable's own.
+
+        Args:
+            value: a number.
+            name: of the variable in the system, for messages.
+
+        Raises:
+            InputError: nothing can be added to the variable, or not this value.
+
+        """
+        own = TYPES[self.type]
+        if own.family not in ("Real", "Integer") or own.is_wide:
+            raise InputError(f"{name} is of type {self.type}: nothing can be added to it")
+        if not is_finite(value) or (
+            own.family == "Integer" and (value != int(value) or abs(value) > own.most - own.least)
+        ):
+            raise InputError(f"{name}: {value!r} cannot be added to it")
+        return float(value)
 
     def cell(self, value: object, where: str = "") -> Value:
         """Convert a value of a table: a number, a truth value or the name of an item.

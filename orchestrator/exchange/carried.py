@@ -20,17 +20,16 @@ from fmus.discovery import RELATED, RELATED_MANIFEST
 from orchestrator.cosim import (
     Experiment,
     Hook,
-    Playback,
     PortName,
     System,
     Table,
-    bind_parameter_set,
     make_plan,
-    read_document,
-    simulate_to_end,
+    read_parameter_set,
+    simulate_plan,
 )
 from orchestrator.exchange.series import Series, comparison, read_series
 from orchestrator.exchange.verify import TOLERANCE, check_tolerance, enumerated
+from orchestrator.machine.documents import read_document
 from orchestrator.machine.errors import Findings, InputError, listed
 from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors
@@ -138,7 +137,7 @@ class Carried:
         """
         name = path.relative_to(self._folder)
         with explain_errors(self._fmu, f"{name} is not readable"):
-            element = read_document(path.read_bytes(), lambda _: None)
+            element = read_document(path.read_bytes())
             if element.tag != root:
                 raise ValueError(f"its root element is <{element.tag}>, not <{root}>")
             return element
@@ -227,12 +226,12 @@ class Carried:
             names = [PortName(self._component.name, name) for name in stimuli.columns]
             columns = list(stimuli.columns.values())
             system, input_table = with_input_table(system, names, stimuli.times, columns)
-            hooks.append(Playback(input_table))
+            hooks.append(input_table.playback())
             _note_unknown(stimuli, "the table of inputs", findings)
         table = Table()
         # Tools record results after a step, before they set the inputs of its end.
         plan = make_plan(system, Experiment(stop, step, "gauss-seidel", start))
-        simulate_to_end(plan, [table], hooks=hooks)
+        simulate_plan(plan, [table], hooks).require_success(system.name)
         _note_unknown(expected, "the table of results", findings)
         said = f"{comparison(table, self._component, expected, tolerance, stop)} ({whose})"
         outputs = (variable.name for variable in self._component.having("output"))
@@ -260,8 +259,8 @@ class Carried:
         path = self._named(trial, _PARAMETERS)
         if path is None:
             return self._system
-        bound = bind_parameter_set(self._fmu, self._component.name, path, findings)
-        return self._system.with_parameters(bound.parameters)
+        values = read_parameter_set(path, self._component, findings)
+        return self._system.with_parameters(values)
 
     def _series(self, trial: _Trial, part: str) -> Series | None:
         """A table that an experiment names; None: it names none."""

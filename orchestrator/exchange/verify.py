@@ -26,7 +26,7 @@ from orchestrator.cosim import (
     Run,
     System,
     make_plan,
-    simulate_to_end,
+    simulate_plan,
 )
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.texts import BOOLEANS, finite
@@ -83,7 +83,8 @@ class Algorithm(NamedTuple):
         if self.turned:
             turned = _Turned(observer)
             observer, hooks = turned, (*hooks, turned)
-        simulate_to_end(plan, [observer], self.exchange, hooks)
+        ending = simulate_plan(plan, [observer], hooks, self.exchange)
+        ending.require_success(system.name)
 
 
 class _Turned:
@@ -240,7 +241,7 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
         words = (
             f"in the order {Experiment.format_order(order)}, each with the latest outputs{start}"
         )
-        yield Algorithm(names, None, exchange._replace(groups=groups), words)
+        yield Algorithm(names, None, replace(exchange, groups=groups), words)
         if names != tuple(order):
             return
     # Other tools solve rings, or delay them.
@@ -288,14 +289,15 @@ class _Samples:
     def begin(self, header: Header) -> None:
         """Find out where the columns are."""
         self._places = [header.place[name] for name in self._columns]
-        self._integers = [(i, standing) for i, standing in header.places() if standing.c_type]
+        self._header = header
+        self._integers = [name for name, of in header.types.items() if of != "String"]
         self._last = np.empty((0, 1 + len(header.columns)))
 
     def take(self, rows: np.ndarray) -> None:
         """Take the samples that lie between some rows."""
         rows = np.vstack((self._last, rows))
-        for place, standing in self._integers:
-            rows[:, place] = standing.values(rows[:, place])
+        for name in self._integers:
+            rows[:, self._header.place[name]] = self._header.values(name, rows)
         self._sample(rows, int(np.searchsorted(self._times, rows[-1, 0], side="right")))
         self._last = rows[-1:].copy()
 

@@ -85,10 +85,7 @@ class VisibleRows(Table):
     def begin(self, header: Header) -> None:
         """Make room for a run that is kept whole."""
         self.whole_header = header
-        # An integer of 64 bits is drawn as a double.
-        self._integers = [(i, one) for i, one in header.places() if one.c_type is not None]
-        self._kept = [0, *(header.place[name] for name in header.numeric_columns)]
-        header = replace(header, columns=header.numeric_columns, standing={})
+        header = replace(header, columns=header.numeric_columns, types={})
         self._enter(header, np.empty((_WHOLE, 1 + len(header.columns))))
         self._watched = [
             i for i, name in enumerate(header.columns, 1) if name in self._watched_names
@@ -100,12 +97,8 @@ class VisibleRows(Table):
 
     def take(self, rows: np.ndarray) -> None:
         """Keep what can be seen of some rows."""
-        if self._integers:
-            rows = rows.copy()
-            for place, standing in self._integers:
-                rows[:, place] = standing.values(rows[:, place])
-        if len(self._kept) < rows.shape[1]:
-            rows = rows[:, self._kept]
+        # An integer of 64 bits is drawn as a double.
+        rows = self.whole_header.numeric(rows)
         if self._divisions:
             rows = np.vstack((self._last, rows))
         elif self._n + len(rows) <= _WHOLE:

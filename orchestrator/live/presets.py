@@ -16,7 +16,6 @@ from typing import Any, NamedTuple
 
 from fmus.kinds import NATIVE
 from orchestrator.cosim import (
-    Action,
     Alter,
     Component,
     Event,
@@ -389,7 +388,7 @@ def _event(number: int, event: Event) -> Plain:
         "at": event.at,
         "lasts": event.lasts,
         "repeat": event.repeat or None,
-        "action": _action(event.action),
+        "action": _action(event),
     }
     if (when := event.when) is not None:
         signal = {"signal": str(when.signal)}
@@ -397,8 +396,8 @@ def _event(number: int, event: Event) -> Plain:
     return {key: value for key, value in found.items() if value is not None}
 
 
-def _action(action: Action) -> Plain:
-    match action:
+def _action(event: Event) -> Plain:
+    match event.action:
         case Alter(effect, values):
             return {"kind": "alter", "effect": effect, "values": _assigned(values)}
         case Freeze(targets):
@@ -412,7 +411,7 @@ def _action(action: Action) -> Plain:
             return {"kind": "reset", "components": list(components)}
         case Stop(why):
             return {"kind": "stop", "why": why}
-    raise TypeError(f"the page does not know the event {action!r}")
+    raise TypeError(f"the page does not know the event {event.action!r}")
 
 
 def _assigned(values: Sequence[tuple[PortName, Value]]) -> list[list[Value]]:

@@ -13,7 +13,7 @@ from typing import Protocol
 from fmus.language.types import FLOAT
 from fmus.native.emit import number_in_c
 from fmus.native.pieces import Place
-from orchestrator.cosim import FACTOR, OFFSET, Linear, Plan, PortName
+from orchestrator.cosim import Linear, Plan, PortName
 from orchestrator.program.kind import Kind
 
 _SOURCE = Path(__file__).with_name("events.c")
@@ -130,7 +130,7 @@ def tables_of(text: Text) -> str:
     inputs = []
     for name in text.inputs:
         change = fed.get(name)
-        factor, offset = FACTOR, OFFSET
+        factor, offset = Linear.UNCHANGED
         if isinstance(change, Linear):
             factor, offset = change.factor, change.offset
         numbers = f"{number_in_c(factor)}, {number_in_c(offset)}"

@@ -36,7 +36,7 @@ from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, 
 from fmus.ports.description_fmi3 import terminals_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
-from orchestrator.cosim import Plan, PortName, Visit
+from orchestrator.cosim import Plan, PortName
 from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.file_names import file_name
@@ -528,7 +528,7 @@ class SystemModel:
             visit.component
             for stage in self.text.stages.passing or ()
             for visit in stage.visits
-            if isinstance(visit, Visit) and self.text.reads(visit)
+            if self.text.reads(visit)
         }
         for i, (name, member) in enumerate(self.text.members.items()):
             kind = self.text.kind(name)

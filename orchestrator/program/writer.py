@@ -34,10 +34,7 @@ from orchestrator.cosim import (
     Plan,
     PortName,
     Stage,
-    Stages,
     Visit,
-    stages_of,
-    types_read,
 )
 from orchestrator.machine.errors import InputError, listed
 from orchestrator.program.events import BEGINNING, tables_of, text_of_events
@@ -395,7 +392,7 @@ class Text:
         self.plan = replace(
             self.plan, experiment=replace(self.plan.experiment, order=arrangement.order)
         )
-        self.stages: Stages[Stage] = stages_of(system, arrangement, self.plan.decimations)
+        self.stages = self.plan.stages()
         self.passes = self.stages.passing is not None
         self.is_tuned = self.is_tuned or self.alters
         self.components = [*system.components]
@@ -951,14 +948,13 @@ class Text:
         yield from _copies(
             [(self.columns[one].text, shown[one].text) for one in stage.shows if one in shown]
         )
-        visits = [visit for visit in stage.visits if isinstance(visit, Visit)]
-        for visit in visits:
+        for visit in stage.visits:
             yield from self._visited(visit, stage.decimation.every if stage.decimation else 1)
         if stage is self.stages.stepping[-1] and stage.decimation is None:
             # What was just written is slow to read in another way: outputs are better looked at
             # before they are computed again.
             yield from self._unsound()
-        for visit in visits:
+        for visit in stage.visits:
             kind = self.kind(visit.component)
             is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)
             if is_stale and self.reads(visit):
@@ -1014,7 +1010,7 @@ class Text:
         """Whether one of the outputs is read that the component computes."""
         component = self.plan.system.components[visit.component]
         outputs = (port.name for port in self.kind(visit.component).ports["output"])
-        return bool(types_read(visit.reads, component, outputs))
+        return bool(visit.types_read(component, outputs))
 
 
 def _waiting(functions: Iterable[tree.Function]) -> set[tree.Function]:

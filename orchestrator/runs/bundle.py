@@ -18,7 +18,7 @@ from typing import TypedDict, Unpack
 
 from fmus.discovery import fingerprint
 from fmus.kinds import AUTO, FMI_VERSIONS, KINDS, NATIVE, PYTHON
-from orchestrator.cosim import ssp_bytes
+from orchestrator.cosim import write_ssp
 from orchestrator.machine.cache import made_once, read_cached, users_folder
 from orchestrator.machine.children import run_module
 from orchestrator.machine.compilers import compiler_for
@@ -99,9 +99,7 @@ def build_bundle(
         run_fmus("build", unfinished, *words_of(form), hear=hear)
         files = sorted(unfinished.glob("*.fmu"))
         if not form.get("arrays"):
-            archive = unfinished / ARCHIVE
-            archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
-            files.append(archive)
+            files += write_ssp(closed_loop(unfinished), unfinished)
         write_checksums(unfinished, files)
         for path in unfinished.iterdir():
             before = folder / path.name

@@ -10,7 +10,6 @@ from typing import Any
 
 from auv_fmu.paper.euler import STEP
 from orchestrator.cosim import (
-    PYTHON_LOOP,
     Alter,
     Ending,
     Event,
@@ -21,12 +20,9 @@ from orchestrator.cosim import (
     Isolation,
     Observer,
     Plan,
-    Playback,
     PortName,
     Set,
-    Stepping,
     System,
-    choose_loop,
     make_plan,
     simulate_plan,
 )
@@ -61,8 +57,6 @@ class Prepared:
     Attributes:
         scenario: as its file has it, but for events and inputs of the request.
         plan: the system, and its steps.
-        isolation: of the FMUs in processes of their own; None: they run in this one.
-        stepping: how its steps are made.
         events: that happen to it.
         input_table: values of inputs over time; None: they keep their values.
 
@@ -70,8 +64,6 @@ class Prepared:
 
     scenario: Scenario
     plan: Plan
-    isolation: Isolation | None = None
-    stepping: Stepping = PYTHON_LOOP
     events: tuple[Event, ...] = ()
     input_table: InputTable | None = None
 
@@ -101,9 +93,7 @@ class Prepared:
             InputError: an FMU or a parameter is not usable; nothing was stepped.
 
         """
-        return simulate_plan(
-            self.plan, observers, self.isolation, self.stepping, [*hooks, *self._hooks()]
-        )
+        return simulate_plan(self.plan, observers, [*hooks, *self._hooks()])
 
     def doubts(self) -> list[str]:
         """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
@@ -120,7 +110,7 @@ class Prepared:
         return self.plan.identity(self.events, inputs)
 
     def _hooks(self) -> list[Hook]:
-        playing: list[Hook] = [] if self.input_table is None else [Playback(self.input_table)]
+        playing: list[Hook] = [] if self.input_table is None else [self.input_table.playback()]
         return playing + ([Events(self.events)] if self.events else [])
 
     def missed(self, ending: Ending) -> list[Event]:
@@ -173,14 +163,13 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     if request.strict and coupling is None and order in (None, "feedthrough", "gauss-seidel"):
         coupling = "solve"
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
-    plan = make_plan(system, experiment)
+    isolation = Isolation.of(request.isolate, request.step_timeout)
+    plan = make_plan(system, experiment, isolation, request.loop)
     with findings.collecting():
         followed = input_table.targets if input_table else ()
         events = read_events(scenario.name, scenario.events, replace(system, step=step), followed)
     findings.refuse()
-    isolation = Isolation.of(request.isolate, request.step_timeout)
-    stepping = choose_loop(request.loop, experiment, isolation)
-    return Prepared(scenario, plan, isolation, stepping, events, input_table)
+    return Prepared(scenario, plan, events, input_table)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

@@ -17,16 +17,14 @@ from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin, get_t
 
 from fmus.kinds import AUTO, KindName
 from orchestrator.cosim import (
-    LOOPS,
     Checkpoints,
-    CouplingName,
     Experiment,
     Isolation,
-    LoopName,
     Order,
+    Plan,
     RealTime,
     Selection,
-    TableFormat,
+    TableFile,
 )
 from orchestrator.machine.texts import literal
 
@@ -157,7 +155,7 @@ class Options:
         choices=None,
         metavar=f"{'|'.join(Experiment.ORDERS)}|NAME,...",
     )
-    coupling: CouplingName | None = option(
+    coupling: Experiment.Coupling | None = option(
         None,
         "method for algebraic loops: solve them, delay them by one step, or solve them with inputs "
         "that change linearly within the step; default: the scenario's, else solve where the FMUs "
@@ -175,7 +173,7 @@ class Options:
         None,
         "table (CSV or Parquet) of unconnected inputs over time; default: the scenario's own",
     )
-    loop: LoopName = option(LOOPS[0], LOOP)
+    loop: Plan.Loop = option(Plan.LOOPS[0], LOOP)
     isolate: bool = option(
         False,
         "run each FMU in a separate process, so that a crash or hang cannot take the run down",
@@ -245,7 +243,7 @@ class Files:
         "columns of the table, for example plant.y.*,controller.tau; default: all",
         metavar="outputs|all|PATTERN,...",
     )
-    format: TableFormat = option("csv", "file format of the table; default: csv")
+    format: TableFile.Format = option("csv", "file format of the table; default: csv")
     no_figures: bool = option(False, "do not draw figures")
     real_time: float | None = option(
         None, "limit the speed to FACTOR times real time", metavar="FACTOR"

@@ -8,7 +8,7 @@ import sys
 import warnings
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, fields, replace
+from dataclasses import asdict, fields
 from datetime import UTC, datetime
 from functools import cached_property
 from html import escape
@@ -24,20 +24,14 @@ import numpy as np
 
 from fmus.kinds import NATIVE, PYTHON
 from orchestrator.cosim import (
-    PYTHON_LOOP,
-    TABLE_FORMATS,
-    TYPES,
     Ending,
     Experiment,
     Header,
     Occurrence,
     PortName,
-    Standing,
-    StringTable,
     System,
     Table,
-    TableFormat,
-    runs_python,
+    TableFile,
 )
 from orchestrator.figures.style import Drawn, printed_unit
 from orchestrator.figures.visible import VisibleRows
@@ -60,7 +54,7 @@ if TYPE_CHECKING:
 METRICS = "metrics.json"
 
 #: The table of a run, in one format or the other, and all files that every run writes.
-TABLES = tuple(f"result.{ending}" for ending in TABLE_FORMATS)
+TABLES = tuple(f"result.{ending}" for ending in TableFile.FORMATS)
 FILES = (*TABLES, METRICS, RECORD)
 
 #: Packages whose versions a result depends on.
@@ -133,8 +127,7 @@ class Result(Table):
         super().__init__()
         self.resumed_at: float | None = None
         self._scenario, self._loops, self._clock = scenario, loops, Stopwatch()
-        # Without its loop, whose library another process could not have.
-        self._prepared = prepared and replace(prepared, stepping=PYTHON_LOOP)
+        self._prepared = prepared
         self._file, self._record = Path(), dict[str, Any]()
 
     def __repr__(self) -> str:
@@ -204,8 +197,9 @@ class Result(Table):
 
         index = pd.Index(self.time, name="time")
         frame = pd.DataFrame(self.rows[:, 1:], index=index, columns=list(self.columns), copy=True)
-        for place, standing in self.header.places():
-            frame.isetitem(place - 1, standing.values(self.rows[:, place]))
+        for place, name in enumerate(self.columns):
+            if name in self.header.types:
+                frame.isetitem(place, self[name])
         return frame
 
     def plot(self, *what: str | Result) -> Figure:
@@ -252,7 +246,7 @@ class Result(Table):
     def save(
         self,
         folder: str | Path,
-        format: TableFormat = "csv",  # noqa: A002
+        format: TableFile.Format = "csv",  # noqa: A002
         *,
         force: bool = False,
     ) -> Path:
@@ -271,11 +265,11 @@ class Result(Table):
             ValueError: the folder cannot be written, or there is no such format.
 
         """
-        if format not in TABLE_FORMATS:
-            raise InputError(f"format {format!r}: use one of {', '.join(TABLE_FORMATS)}")
+        if format not in TableFile.FORMATS:
+            raise InputError(f"format {format!r}: use one of {', '.join(TableFile.FORMATS)}")
         folder = Path(folder)
         with replace_files(folder, FILES, force=force) as unfinished:
-            table = TABLE_FORMATS[format](unfinished / f"result.{format}")
+            table = TableFile.at(unfinished / f"result.{format}")
             table.begin(self.header)
             table.take(self.rows)
             table.end(self.ending)
@@ -422,7 +416,7 @@ def write_record(
             component.name: {
                 "file": component.fmu.name,
                 "sha256": component.digest,
-                "kind": PYTHON if runs_python(component.folder) else NATIVE,
+                "kind": PYTHON if component.runs_python else NATIVE,
             }
             for component in prepared.system.components.values()
         },
@@ -439,7 +433,7 @@ def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[st
         "experiment": vars(header.experiment),
         "loop": header.loop,
         "types": {
-            **{n: header.standing[n].fmi_type for n in header.columns if n in header.standing},
+            **{n: header.types[n] for n in header.columns if n in header.types},
             **{str(n): "String" for n, value in header.parameters.items() if type(value) is str},
         },
         "units": dict(header.units),
@@ -512,7 +506,7 @@ def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
     """The header of a table, from the record beside it."""
     stated = record["experiment"]
     known = {field.name: stated[field.name] for field in fields(Experiment) if field.name in stated}
-    types, strings = _types_in(record), StringTable()
+    types = _types_in(record)
     return Header(
         columns,
         Experiment(**known),
@@ -521,7 +515,7 @@ def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
             for name, value in record["parameters"].items()
         },
         record.get("loop", "python"),
-        {name: Standing(types[name], strings) for name in columns if name in types},
+        {name: types[name] for name in columns if name in types},
         record.get("units", {}),
     )
 
@@ -530,7 +524,7 @@ def _types_in(record: dict[str, Any]) -> dict[str, str]:
     """The types of columns and parameters that hold anything but doubles."""
     # Earlier versions named columns of texts only.
     types = record.get("types", dict.fromkeys(record.get("texts", ()), "String"))
-    if not all(TYPES[fmi_type].stands for fmi_type in types.values()):
+    if not Header.TYPES.issuperset(types.values()):
         raise ValueError("it holds types that no run has")
     return dict(types)
 
@@ -582,8 +576,7 @@ def stored_rows(file: Path, record: dict[str, Any]) -> tuple[Header, Iterator[np
     place = locate(file)
     columns = read_columns(place)
     header = header_in(record, columns) if record else None
-    standing = header.standing if header else {}
-    blocks = read_rows(place, {name: column.number for name, column in standing.items()})
+    blocks = read_rows(place, header.encoders if header else {})
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")

@@ -16,15 +16,14 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cosim import (
-    TABLE_FORMATS,
     Checkpoints,
     Ending,
     Hook,
     Observer,
-    Progress,
     RealTime,
     Selection,
     System,
+    TableFile,
 )
 from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
@@ -46,6 +45,7 @@ from orchestrator.runs.folder import (
 )
 from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
 from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.progress import Progress
 from orchestrator.runs.request import (
     CHECKPOINT_EVERY,
     Files,
@@ -221,7 +221,7 @@ class WrittenRun:
             {name for one in loops for name in (one.y_d if files.no_figures else one.drawn())}
         )
         self.watch, self._metrics = Watch(loops), Metrics(loops)
-        self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
+        self._table = TableFile.at(folder / f"result.{files.format}")
         self._real_time = None if files.real_time is None else RealTime(files.real_time)
         self._resumed_at = checkpoints and checkpoints.time
         self._hooks: list[Hook] = [one for one in (checkpoints, self._real_time) if one]

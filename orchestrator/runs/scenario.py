@@ -24,12 +24,12 @@ from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.cosim import (
-    TYPES,
-    Action,
     Alter,
     Condition,
     Event,
+    Experiment,
     Freeze,
+    Header,
     InputTable,
     Linear,
     Mapped,
@@ -38,16 +38,15 @@ from orchestrator.cosim import (
     Release,
     Reset,
     Set,
-    Standing,
     Stop,
-    StringTable,
     System,
+    Table,
     Value,
     Variable,
 )
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.file_names import file_name
-from orchestrator.machine.texts import finite, flatten, is_finite, literal
+from orchestrator.machine.texts import finite, flatten, literal
 from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.runs import SCENARIOS_FOLDER, find_toml, names_in
 from orchestrator.runs.tables import read_columns, read_rows, records
@@ -143,32 +142,28 @@ class Inputs:
         return self._read[kinds]
 
     def _columns(self, variables: Sequence[Variable]) -> list[np.ndarray]:
-        strings = StringTable()
-        numbers: dict[str, Callable[[object], float]] = {}
-        for name, variable in zip(self.names, variables, strict=True):
-            kind = TYPES[variable.type]
-            if kind.stands or kind.family in ("Boolean", "Enumeration"):
-                numbers[name] = partial(_stand_in, name, variable, strings)
+        named = dict(zip(self.names, variables, strict=True))
+        types = {name: one.type for name, one in named.items() if one.type in Header.TYPES}
+        header = Header(self.names, Experiment(1.0, 1.0), types=types)
+        numbers = {
+            name: partial(_number, name, variable, header.encoders.get(name, float))
+            for name, variable in named.items()
+            if name in types or variable.family in ("Boolean", "Enumeration")
+        }
         blocks = read_rows(self.file, numbers, _NO_INPUTS)
-        rows = np.vstack([np.empty((0, 1 + len(variables))), *blocks])
-        times, *columns = rows.T
-        return [times] + [
-            Standing(variable.type, strings).values(column)
-            if TYPES[variable.type].stands
-            else column
-            for variable, column in zip(variables, columns, strict=True)
-        ]
+        table = Table.of(header, np.vstack([np.empty((0, 1 + len(variables))), *blocks]))
+        return [table.time, *(table[name] for name in self.names)]
 
 
-def _stand_in(name: str, variable: Variable, strings: StringTable, value: object) -> float:
-    """The number that stands for a cell of a table.
+def _number(name: str, variable: Variable, encode: Callable[[Any], float], value: object) -> float:
+    """Return what a row has for a cell of a table.
 
     Raises:
         ValueError: the variable cannot have this value.
 
     """
     try:
-        return strings.stand_in(variable.typed(variable.cell(value, f"{name}:"), name))
+        return encode(variable.typed(variable.cell(value, f"{name}:"), name))
     except InputError as error:
         raise ValueError(str(error)) from None
 
@@ -683,24 +678,17 @@ def _value(system: System, port: PortName, value: Any, change: (Linear | Mapped)
 
 def _offset(system: System, port: PortName, value: Any, change: (Linear | Mapped) | None) -> float:
     """Convert the bias of a signal to that of an input."""
-    variable = system.component(port.component).variable(port.port)
-    kind = TYPES[variable.type]
-    if kind.family not in ("Real", "Integer") or kind.is_wide:
-        raise InputError(f"{port} is of type {variable.type}: nothing can be added to it")
-    if not is_finite(value) or (
-        kind.family == "Integer" and (value != int(value) or abs(value) > kind.most - kind.least)
-    ):
-        raise InputError(f"{port}: {value!r} cannot be added to it")
+    added = system.component(port.component).variable(port.port).difference(value, str(port))
     if isinstance(change, Mapped):
         raise InputError(f"{port} is mapped by its connection: nothing can be added to it")
-    return change.factor * float(value) if isinstance(change, Linear) else float(value)
+    return change.factor * added if isinstance(change, Linear) else added
 
 
 def _text(value: Any) -> Any:
     return literal(value) if isinstance(value, bool) else value
 
 
-def _set(values: Mapping[str, Any], system: System) -> Action:
+def _set(values: Mapping[str, Any], system: System) -> _Action:
     fed = {connection.target: connection.source for connection in system.connections}
     parameters, inputs = [], []
     for name, value in flatten(values):
@@ -719,15 +707,18 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
     return Set(tuple(parameters), tuple(inputs))
 
 
-def _reset(names: Any, system: System) -> Action:
+def _reset(names: Any, system: System) -> _Action:
     for name in _things(names):
         if system.steps.get(system.component(name).name, system.step) != system.step:
             raise InputError(f"{name} takes longer steps: it cannot be reset within one")
     return Reset(tuple(_things(names)))
 
 
+#: Any action of an event.
+_Action = Alter | Freeze | Release | Reset | Set | Stop
+
 #: Actions of events, by the key of their table.
-ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
+ACTIONS: Mapping[str, Callable[[Any, System], _Action]] = {
     "set": _set,
     "override": lambda values, system: Alter("override", _altered(values, system, _value)),
     "bias": lambda values, system: Alter("bias", _altered(values, system, _offset)),

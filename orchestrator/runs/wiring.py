@@ -14,7 +14,6 @@ from orchestrator.cosim import (
     Connection,
     PortName,
     System,
-    join_terminals,
     read_component,
 )
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
@@ -196,7 +195,7 @@ def _wire(components: Mapping[str, Component], target: str, source: str) -> list
         begin = components[start].terminals.get(source_group)
         if end and begin:
             try:
-                return list(join_terminals(components[to], end, components[start], begin))
+                return list(Connection.of_terminals(components[to], end, components[start], begin))
             except InputError as error:
                 raise InputError(f"wire {source} -> {target}: {error}") from None
     if group in inputs and not members:

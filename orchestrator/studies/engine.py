@@ -13,7 +13,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from orchestrator.cosim import LOOPS, PYTHON_LOOP, Order, PortName, choose_loop, make_plan
+from orchestrator.cosim import Order, Plan, PortName, make_plan
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
@@ -108,22 +108,18 @@ class FmuEngine:
     def __init__(
         self,
         prepared: Mapping[str, Prepared],
-        loop: str = LOOPS[0],
+        loop: str = Plan.LOOPS[0],
         own: Sequence[OwnIndex] = (),
     ) -> None:
         """Take what is run.
 
         Args:
             prepared: by the names that runs have for their scenarios.
-            loop: that makes the steps, one of :data:`orchestrator.cosim.loop.LOOPS`.
+            loop: that makes the steps, one of :attr:`.Plan.LOOPS`.
             own: indices of the user's own.
 
         """
-        # Compiled loops do not travel: each run takes one where it is made.
-        self._prepared = {
-            name: replace(one, stepping=PYTHON_LOOP) for name, one in prepared.items()
-        }
-        self._loop, self._own = loop, own
+        self._prepared, self._loop, self._own = dict(prepared), loop, own
 
     @property
     def digest(self) -> str:
@@ -154,8 +150,8 @@ class FmuEngine:
         loops = loops_of(system)
         own = [*chain(*(one.indices for one in self._own))]
         indices, watch = Indices(loops, own=own), Watch(loops)
-        plan, stepping = make_plan(system, experiment), choose_loop(self._loop, experiment)
-        ending = replace(prepared, plan=plan, stepping=stepping).run([indices, watch])
+        plan = make_plan(system, experiment, loop=self._loop)
+        ending = replace(prepared, plan=plan).run([indices, watch])
         if ending.interrupts:
             raise KeyboardInterrupt
         wary = kinds_of([*cautions(values_of(system), point.step, loops), *watch.found()])

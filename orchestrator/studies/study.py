@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
-from orchestrator.cosim import OrderName
+from orchestrator.cosim import Order
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.file_names import file_name
 from orchestrator.machine.user_files import read_text
@@ -112,7 +112,7 @@ class Study:
     engine: str = FMU
     stop_time: StopTime | None = None
     step: float | None = None
-    order: OrderName | None = None
+    order: Order | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
     sample: Sample | None = None

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
-from orchestrator.cosim import LOOPS, LoopName, System
+from orchestrator.cosim import Plan, System
 from orchestrator.figures.study_values import FigureEntry
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError
@@ -70,7 +70,7 @@ class Means:
         "give the same numbers; default: from the study",
     )
     kind: KindName = option(AUTO, KIND)
-    loop: LoopName = option(LOOPS[0], LOOP)
+    loop: Plan.Loop = option(Plan.LOOPS[0], LOOP)
     scheduler: str | None = option(
         None,
         "address of a Dask scheduler whose workers make the runs, for example "
@@ -97,7 +97,7 @@ def sweep(
     *,
     engine: EngineName | None = None,
     kind: KindName = AUTO,
-    loop: LoopName = LOOPS[0],
+    loop: Plan.Loop = Plan.LOOPS[0],
     scheduler: str | None = None,
     workers: int | None = None,
     out: str | Path | None = None,

@@ -20,7 +20,7 @@ from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import Theorem, theorem
 from auv_fmu.proof.gain_conditions import observer_rate
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
-from orchestrator.cosim import CsvLines, Ending, Header, PortName, System, Table, every
+from orchestrator.cosim import Ending, Header, PortName, System, Table, TableFile
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.cautions import gain_of_a_step, values_of
 from orchestrator.vehicle.signals import (
@@ -245,11 +245,11 @@ class CertificatesFile:
         """
         self._path, self._loop = path, loop
         self._interval = interval
-        self._lines: CsvLines | None = None
+        self._file: TableFile | None = None
 
     def begin(self, header: Header) -> None:
         """Find out whether there will be certificates."""
-        self._every = every(self._interval, header)
+        self._every = header.every(self._interval)
         table = Table.of(header, np.empty((0, 1 + len(header.columns))))
         self._is_possible = not missing_for_certificates(table, self._loop)
         columns = _columns(self._loop) if self._is_possible else ()
@@ -269,12 +269,12 @@ class CertificatesFile:
             chosen = self._every.chosen(starts[:, 0])
             starts, ends = starts[chosen], ends[chosen]
         if len(starts):
-            if self._lines is None:
-                self._lines = CsvLines(self._path, CERTIFICATE_COLUMNS)
-            found = _certificates(self._header, self._loop, starts, ends)
-            self._lines.write(found.tolist())
+            if self._file is None:
+                self._file = TableFile.at(self._path)
+                self._file.begin(Header(CERTIFICATE_COLUMNS[1:], self._header.experiment))
+            self._file.take(_certificates(self._header, self._loop, starts, ends))
 
     def end(self, ending: Ending) -> None:
         """Close the file."""
-        if self._lines is not None:
-            self._lines.close()
+        if self._file is not None:
+            self._file.end(ending)

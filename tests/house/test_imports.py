@@ -153,7 +153,7 @@ def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
 
 
 #: So many names are taken through the door of the master. Fewer is better.
-MOST_NAMES = 74
+MOST_NAMES = 45
 
 
 def test_the_master_is_used_through_its_door_only():

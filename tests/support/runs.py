@@ -15,7 +15,6 @@ from orchestrator.cosim import (
     Order,
     System,
     Table,
-    choose_loop,
     make_plan,
     simulate_plan,
 )
@@ -66,8 +65,7 @@ def run_table(
 ) -> Table:
     """All rows of a run, however it ends."""
     table = Table()
-    stepping = choose_loop(loop, experiment, isolation)
-    simulate_plan(make_plan(system, experiment), [table], isolation, stepping, hooks)
+    simulate_plan(make_plan(system, experiment, isolation, loop), [table], hooks)
     return table
 
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim import StringTable, System
+from orchestrator.cosim import System
 from orchestrator.cosim.fmi.instance import Part
+from orchestrator.cosim.variables import StringTable
 from support.archives import fmu, variable
 from support.small_fmus import connected
 

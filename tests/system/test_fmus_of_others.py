@@ -17,7 +17,6 @@ from orchestrator.commands.main import main
 from orchestrator.cosim import (
     Connection,
     Linear,
-    Playback,
     PortName,
     System,
     read_component,
@@ -359,7 +358,7 @@ def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variabil
     file = tmp_path / "inputs.csv"
     file.write_text("time,a.u\n" + "".join(f"{t},{u}\n" for t, u in rows))
     system, input_table = read_inputs(Inputs(file), system_of(fmu), ())
-    table = run(system, hooks=[Playback(input_table)], **way)
+    table = run(system, hooks=[input_table.playback()], **way)
     told = np.array(rows, dtype=[("time", float), ("u", float)])
     theirs = fmpy.simulate_fmu(
         str(fmu), stop_time=1.0, output_interval=0.1, input=told, output=["y"], validate=False

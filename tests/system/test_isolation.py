@@ -23,7 +23,6 @@ from orchestrator.cosim import (
     Isolation,
     System,
     Table,
-    choose_loop,
     make_plan,
     read_component,
     simulate_plan,
@@ -237,16 +236,13 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
             go_on.wait()
 
     table = Waits()
-    plan = make_plan(foreign_system(c_fmu, "SILENT_ERROR"), SHORT)
+    plan = make_plan(foreign_system(c_fmu, "SILENT_ERROR"), SHORT, loop=loop)
     talkative = foreign_system(c_fmu, "LOGS", at=0.0)
-    steps = choose_loop(loop, plan.experiment)
-    thread = threading.Thread(target=simulate_plan, args=(plan, [table], None, steps))
+    other = make_plan(talkative, Experiment(STEP, STEP), loop=loop)
+    thread = threading.Thread(target=simulate_plan, args=(plan, [table]))
     thread.start()
     assert begun.wait(60.0)
-    assert (
-        len(simulate_plan(make_plan(talkative, Experiment(STEP, STEP)), stepping=steps).messages)
-        == 101
-    )
+    assert len(simulate_plan(other).messages) == 101
     gc.collect()
     go_on.set()
     thread.join()

@@ -27,7 +27,6 @@ from orchestrator.cosim import (
     Run,
     System,
     Table,
-    choose_loop,
     make_plan,
     simulate_plan,
 )
@@ -256,7 +255,7 @@ def test_observers_of_slow_steps_are_told_meanwhile(folder, loop):
 
     table, experiment = Counts(), Experiment(10.0, H)
     system = pair(folder, "BEHAVE", milliseconds=40)
-    simulate_plan(make_plan(system, experiment), [table], None, choose_loop(loop, experiment))
+    simulate_plan(make_plan(system, experiment, loop=loop), [table])
     assert len(table) == 21
     assert max(told) <= 8
 
@@ -271,9 +270,7 @@ def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
 
     whole, full = Table(), Full()
     system, experiment = pair(folder, "BEHAVE"), Experiment(1000.0, H)
-    ending = simulate_plan(
-        make_plan(system, experiment), [full, whole], None, choose_loop(loop, experiment)
-    )
+    ending = simulate_plan(make_plan(system, experiment, loop=loop), [full, whole])
     assert ending.failure is not None
     assert ending.failure == (
         f"stopped at t = {whole.time[-1]:g} s: [Errno 28] No space left on device"

@@ -22,12 +22,11 @@ from orchestrator.cosim import (
     PortName,
     System,
     Table,
-    choose_loop,
     make_plan,
     read_component,
     read_ssp,
     simulate_plan,
-    ssp_bytes,
+    write_ssp,
 )
 from orchestrator.cosim.fmi.binary import check_place
 from orchestrator.cosim.stages import arrange
@@ -131,7 +130,7 @@ class Impatient(Table):
 def test_interrupt_keeps_the_rows_and_does_not_reach_the_fmus(system: System, loop: str):
     """In a run that would take minutes."""
     result, experiment = Impatient(), Experiment(1e4, 0.02)
-    simulate_plan(make_plan(system, experiment), [result], stepping=choose_loop(loop, experiment))
+    simulate_plan(make_plan(system, experiment, loop=loop), [result])
     assert result.failure is not None
     assert "interrupted at t =" in result.failure
     assert 1 < len(result) < 500_000
@@ -240,14 +239,15 @@ def test_broken_and_missing_fmus_are_refused(tmp_path: Path, dist: Path):
         run(alone, 1.0, 0.02)
 
 
-def test_ssp_holds_the_system_it_was_made_from(system, dist):
+def test_ssp_holds_the_system_it_was_made_from(system, dist, tmp_path):
     """Also valid against the schema: fmpy's reader checks it."""
     read_ssd(str(dist / "auv.ssp"))
     again = read_ssp(dist / "auv.ssp")
     assert set(again.connections) == set(system.connections)
     assert list(again.components) == list(system.components)
     assert (again.stop_time, again.step) == (100.0, 0.02)
-    assert ssp_bytes(system) == (dist / "auv.ssp").read_bytes()
+    [written] = write_ssp(system, tmp_path)
+    assert written.read_bytes() == (dist / "auv.ssp").read_bytes()
 
 
 def test_csv_opens_in_the_reader_of_fmpy_and_loses_no_digit(system, tmp_path):

@@ -162,6 +162,6 @@ def test_a_scenario_may_state_order_and_steps(workplace):
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_no_step_is_logged(folder, isolation):
     ending = simulate_plan(
-        make_plan(system_of({"a": relay(folder)}), Experiment(10 * H, H)), (), isolation
+        make_plan(system_of({"a": relay(folder)}), Experiment(10 * H, H), isolation)
     )
     assert ending.messages == ("a: initialises",)

@@ -13,7 +13,7 @@ from fmpy.util import read_csv, read_ref_opt_file, write_csv
 
 from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
-from orchestrator.cosim import INITIAL, Experiment, OrderName, PortName, System, read_component
+from orchestrator.cosim import Exchange, Experiment, Order, PortName, System, read_component
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.wiring import closed_loop
@@ -48,7 +48,7 @@ def test_a_fresh_run_of_the_system_is_the_reference(system: System):
 
 
 @pytest.mark.parametrize("order", Experiment.ORDERS)
-def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path, order: OrderName):
+def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path, order: Order):
     path = tmp_path / "ours.csv"
     write(run(system, 2.0, 0.02, order), path)
     assert f" s, in {order} order\n" in verify(path, system, 1e-12)
@@ -233,7 +233,7 @@ def certified(path: Path, system: System, way: str) -> None:
     assert numbers_in(compared)[:2] == [66, 70] and compared.endswith(f" s, {way}")
 
 
-@pytest.mark.parametrize("initial", INITIAL)
+@pytest.mark.parametrize("initial", Exchange.INITIAL)
 @pytest.mark.parametrize(
     "order",
     [ORDER, ("planner", *ORDER[:3]), ("plant", *ORDER[:0:-1]), ("planner", "+".join(ORDER[:3]))],

@@ -82,7 +82,7 @@ def same(table: Table, other: Table, start: float) -> bool:
     times = [0, *(table.header.place[name] for name in TIMES & {*table.columns})]
     rows = table.rows.copy()
     rows[:, times] -= start
-    strings = [name for name, of in table.header.standing.items() if of.c_type is None]
+    strings = [name for name, of in table.header.types.items() if of == "String"]
     return (
         rows.tobytes() == other.rows.tobytes()
         and all(list(table[name]) == list(other[name]) for name in strings)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 import fmpy
 from fmpy.model_description import read_build_description
 
-from orchestrator.cosim.component import Component
+from orchestrator.cosim.component import Component, runs_python
 from orchestrator.machine import cache
 from orchestrator.machine.compilers import compile_library, find_compiler
 from orchestrator.machine.disk import hold_lock
@@ -47,11 +47,6 @@ _CATEGORY = "sources"
 def name_with_fmu(component: Component) -> str:
     """A component and its FMU, for messages."""
     return f"{component.name}: {component.fmu.name}"
-
-
-def runs_python(folder: Path) -> bool:
-    """True for an unpacked FMU that PythonFMU has made."""
-    return (folder / "resources" / "slavemodule.txt").is_file()
 
 
 def check_place(folder: Path) -> None:
@@ -122,13 +117,21 @@ def make_binary(component: Component, folder: Path) -> None:
         raise InputError(f"{component.fmu}: cannot be compiled: {why}") from error
 
 
-def check_binary(component: Component, folder: Path) -> None:
-    """Check that an FMU, unpacked into a folder, has a whole library for this machine, or sources.
+def check_binary(component: Component, folder: Path | None = None) -> bool:
+    """Check that an FMU has a whole library for this machine, or sources.
+
+    Args:
+        component: the FMU.
+        folder: into which it is unpacked; None: the one of this process.
+
+    Returns:
+        True if it has a library; False if its sources have to be compiled first.
 
     Raises:
         InputError: it has neither.
 
     """
+    folder = component.folder if folder is None else folder
     binaries = folder / "binaries"
     identifier = component.description.coSimulation.modelIdentifier
     suffix = fmpy.sharedLibraryExtension
@@ -139,10 +142,10 @@ def check_binary(component: Component, folder: Path) -> None:
                 raise InputError(
                     f"{name_with_fmu(component)}: its {path.name} is truncated: download it again"
                 )
-        return
+        return True
     if _sources_of(component, folder):
         _check_compiler(component)
-        return
+        return False
     others = sorted({path.parent.name for path in binaries.glob(f"*/{glob.escape(identifier)}.*")})
     named_otherwise = sorted(path.name for path in binary.parent.glob(f"*{suffix}"))
     if others:

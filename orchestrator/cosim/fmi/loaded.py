@@ -49,14 +49,13 @@ from fmpy.fmi3 import (
 )
 from fmpy.logging import addLoggerProxy
 
-from orchestrator.cosim.component import Component
+from orchestrator.cosim.component import Component, runs_python
 from orchestrator.cosim.fmi.binary import (
     binary_of,
     check_binary,
     check_place,
     make_binary,
     name_with_fmu,
-    runs_python,
 )
 from orchestrator.cosim.fmi.instance import (
     DO_STEP,

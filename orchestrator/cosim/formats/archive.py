@@ -8,19 +8,18 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import TypeVar
 from urllib.parse import unquote, urlsplit
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from xml.etree.ElementTree import Element
 
 import fmpy.ssp
 from lxml import etree
 
 from orchestrator.cosim.connection import Linear, UndefinedUnit, Unit, conversion
 from orchestrator.cosim.variables import family_of
+from orchestrator.machine.documents import read_document
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, listed, reason
 from orchestrator.machine.texts import finite, integer
 from orchestrator.machine.user_files import check_file, is_folder, unpack
@@ -134,9 +133,6 @@ def _put_into_1_0(document: etree._Element) -> None:
             element.set("source", element.get("source", ""))
 
 
-#: Elements in which others than the standard's are at home.
-_OPEN = ("Annotations", "MetaData", "Signature")
-
 _SUFFIX = Path(STRUCTURE).suffix
 
 #: Endings of descriptions that are read where they are, with the files beside them.
@@ -144,74 +140,6 @@ _LOOSE = (_SUFFIX, ".xml")
 
 #: A number, or that there may be none.
 _Float = TypeVar("_Float", float, None)
-
-
-def read_document(text: bytes, note: Callable[[str], None]) -> Element:
-    """The root element of an XML file; tags and attributes are local names, text is left out.
-
-    Args:
-        text: the file.
-        note: takes flaws that can still be understood.
-
-    Raises:
-        ValueError: it is not well-formed, or not without a document type.
-
-    """
-    reader = _Reader(note)
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = reader.start
-    parser.EndElementHandler = reader.end
-    parser.StartDoctypeDeclHandler = reader.doctype
-    try:
-        parser.Parse(text, True)
-    except expat.ExpatError as error:
-        raise ValueError(f"not well-formed XML: {error}") from error
-    return reader.builder.close()
-
-
-class _Reader:
-    """What is told by the parser, which knows nothing of namespaces.
-
-    Attributes:
-        builder: of the elements.
-
-    """
-
-    def __init__(self, note: Callable[[str], None]) -> None:
-        self.builder = TreeBuilder()
-        self._note = note
-        self._scopes: list[dict[str, str]] = [{}]
-        self._open = 0
-
-    def start(self, tag: str, attributes: dict[str, str]) -> None:
-        """Take the beginning of an element."""
-        scope, plain = dict(self._scopes[-1]), {}
-        for key, value in attributes.items():
-            if key.partition(":")[0] == "xmlns":
-                scope[key.partition(":")[2]] = value
-            else:
-                plain[key.rpartition(":")[2]] = value
-        self._scopes.append(scope)
-        prefix, _, name = tag.rpartition(":")
-        if self._open or name in _OPEN:
-            self._open += 1
-        namespace = scope.get(prefix)
-        if namespace is None and prefix:
-            self._note(f"the prefix {prefix!r} is not declared")
-        elif not self._open and namespace not in NAMESPACES:
-            where = f"in the namespace {namespace!r}" if namespace else "without a namespace"
-            self._note(f"elements are {where}, which is not SSP's")
-        self.builder.start(name, plain)
-
-    def end(self, tag: str) -> None:
-        """Take the end of an element."""
-        self._scopes.pop()
-        self._open = max(self._open - 1, 0)
-        self.builder.end(tag.rpartition(":")[2])
-
-    def doctype(self, *_: object) -> None:
-        """Refuse what could name further files, or unfold into more than memory holds."""
-        raise ValueError("it has a DOCTYPE, which is not allowed")
 
 
 class Archive:
@@ -281,7 +209,7 @@ class Archive:
         try:
             check_file(path)
             text = path.read_bytes()
-            root = read_document(text, remarks.append)
+            root = read_document(text, remarks.append, NAMESPACES, "SSP")
         except Exception as error:
             raise InputError(f"{self.path}: not a readable SSP: {name}: {reason(error)}") from error
         version = root.get("version")

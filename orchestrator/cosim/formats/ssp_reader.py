@@ -790,13 +790,14 @@ def read_ssp(path: Path, variant: str | None = None, findings: Findings | None =
     return system
 
 
-def bind_parameter_set(fmu: Path, name: str, parameters: Path, findings: Findings) -> System:
-    """A system of one FMU that a parameter set is bound to, without a prefix or a mapping.
+def read_parameter_set(
+    path: Path, component: Component, findings: Findings
+) -> Mapping[PortName, Value]:
+    """Read a parameter set of one component, without a prefix or a mapping.
 
     Args:
-        fmu: the file.
-        name: of the component.
-        parameters: the SSV.
+        path: of the SSV.
+        component: whose parameters it sets.
         findings: takes all that is wrong with it.
 
     Raises:
@@ -804,14 +805,18 @@ def bind_parameter_set(fmu: Path, name: str, parameters: Path, findings: Finding
 
     """
     root = Element(_ROOT)
-    content = SubElement(root, "System", name=name)
-    source = quote(str(fmu.resolve()))
-    component = SubElement(SubElement(content, "Elements"), "Component", name=name, source=source)
-    bindings = SubElement(component, "ParameterBindings")
-    SubElement(bindings, "ParameterBinding", source=quote(parameters.name))
-    system = _read(Archive(parameters.parent, findings), root, content)
+    content = SubElement(root, "System", name=component.name)
+    element = SubElement(
+        SubElement(content, "Elements"),
+        "Component",
+        name=component.name,
+        source=quote(str(component.fmu.resolve())),
+    )
+    bindings = SubElement(element, "ParameterBindings")
+    SubElement(bindings, "ParameterBinding", source=quote(path.name))
+    system = _read(Archive(path.parent, findings), root, content)
     findings.refuse()
-    return system
+    return system.parameters
 
 
 def _read(archive: Archive, root: Element, content: Element) -> System:

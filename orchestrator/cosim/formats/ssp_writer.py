@@ -286,9 +286,6 @@ def _whole(
     return found if found.issubset(connected) else set()
 
 
-#: Name of every parameter set: ecos applies the sets of the one name that it is given.
-PARAMETER_SET = "scenario"
-
 #: Libcosim and OMSimulator accept no other prefixes than these.
 _PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS}
 
@@ -312,23 +309,38 @@ _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
 def write_ssp(
-    system: System, folder: Path, flat: bool = False, connectors: bool = False
+    system: System,
+    folder: Path,
+    flat: bool = False,
+    connectors: bool = False,
+    parameter_set: str = "scenario",
 ) -> list[Path]:
-    """Write `NAME.ssp`; the step is part of the system; arguments as of :func:`ssp_bytes`."""
+    """Write `NAME.ssp`; the step is part of the system.
+
+    Args:
+        system: to write.
+        folder: for the file.
+        flat, connectors: as of :func:`ssp_bytes`.
+        parameter_set: name of every parameter set; ecos applies the sets of one name.
+
+    """
     path = folder / f"{file_name(system.name)}.ssp"
-    path.write_bytes(ssp_bytes(system, flat, connectors))
+    path.write_bytes(ssp_bytes(system, flat, connectors, parameter_set))
     return [path]
 
 
-def ssp_bytes(system: System, flat: bool = False, connectors: bool = False) -> bytes:
-    """The archive of a system: its structure and its FMUs, the same bytes every time.
+def ssp_bytes(
+    system: System, flat: bool = False, connectors: bool = False, parameter_set: str = "scenario"
+) -> bytes:
+    """Return the archive of a system: its structure and its FMUs, the same bytes every time.
 
     Args:
         system: to write.
         flat: for tools that know no systems in systems, or make one instance of an FMU only: names
             have no dots, and each component has a copy of its FMU.
         connectors: for tools that take it as one component: the system has connectors, of what it
-            :func:`offers <.nesting.offers>`.
+            :func:`offers`.
+        parameter_set: name of every parameter set.
 
     """
     system = system.flattened() if flat else system
@@ -338,7 +350,9 @@ def ssp_bytes(system: System, flat: bool = False, connectors: bool = False) -> b
         structure = structure_xml(system, sources, connectors)
         content.writestr(ZipInfo(STRUCTURE, _EPOCH), structure)
         for name, source in _parameter_sources(system).items():
-            values = parameter_set_xml(system.components[name], system.parameters_of(name))
+            values = parameter_set_xml(
+                system.components[name], system.parameters_of(name), parameter_set
+            )
             content.writestr(ZipInfo(source, _EPOCH), values)
         fmus = {sources[name]: component for name, component in system.components.items()}
         # In the order of their paths, as before there were copies.
@@ -375,9 +389,7 @@ def _parameter_sources(system: System) -> dict[str, str]:
     return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
 
 
-def parameter_set_xml(
-    component: Component, values: Mapping[str, Value], name: str = PARAMETER_SET
-) -> bytes:
+def parameter_set_xml(component: Component, values: Mapping[str, Value], name: str) -> bytes:
     """Values of one component by the names of its variables, as an SSV."""
     root = Element(_tag("ssv:ParameterSet"), name=name, version=_version(component))
     parameters = _add(root, "ssv:Parameters")

@@ -19,12 +19,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from fmpy.ssp.simulation import simulate_ssp
 
-from orchestrator.cosim import PARAMETER_SET, Experiment, System, write_osp, write_ssp
+from orchestrator.cosim import Experiment, System, write_osp, write_ssp
 from orchestrator.exchange.hosts.drivers import write_rows
 from orchestrator.machine.errors import InputError
 
 #: In the folder: what is run, and where files for the tool go.
 GIVEN, _EXPORT = "given", "export"
+
+#: The name of parameter sets that ecos is told to apply.
+_PARAMETER_SET = "scenario"
 
 #: In the folder: what came of it.
 ROWS = "rows.csv"
@@ -152,7 +155,7 @@ def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
     ecospy = importlib.import_module("ecospy")
     system = system.flattened()
     names = _names(system, "::")
-    parameter_set = {"parameter_set": PARAMETER_SET} if system.parameters else {}
+    parameter_set = {"parameter_set": _PARAMETER_SET} if system.parameters else {}
     with _ecos_simulation(ecospy, system, experiment, folder) as simulation:
         simulation.init(**parameter_set)
         return _stepped(simulation.step, lambda: [*map(simulation.get_real, names)], experiment)
@@ -162,7 +165,7 @@ def _ecos_simulation(ecospy: Any, system: System, experiment: Experiment, folder
     """A simulation of ecos: it reads no SSP 2.0, so with FMI 3.0 its calls say what is in one."""
     if fmi_of(system) == "2.0":
         # It makes one instance of a file, whatever refers to it.
-        [path] = write_ssp(system, folder, flat=True)
+        [path] = write_ssp(system, folder, flat=True, parameter_set=_PARAMETER_SET)
         return ecospy.EcosSimulation(experiment.step, ssp_path=str(path))
     structure = ecospy.EcosSimulationStructure()
     for name, component in system.components.items():
@@ -171,7 +174,7 @@ def _ecos_simulation(ecospy: Any, system: System, experiment: Experiment, folder
         source, target = (f"{end.component}::{end.port}" for end in (wire.source, wire.target))
         structure.make_real_connection(source, target)
     values = {f"{name.component}::{name.port}": x for name, x in system.parameters.items()}
-    structure.add_parameter_set(PARAMETER_SET, values)
+    structure.add_parameter_set(_PARAMETER_SET, values)
     return ecospy.EcosSimulation(experiment.step, structure=structure)
 
 

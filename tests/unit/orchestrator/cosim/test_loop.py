@@ -88,9 +88,6 @@ def test_the_compiled_loop_is_taken_where_it_pays(library: object):
     assert choose_loop("auto", LONG, Isolation()) == PYTHON_LOOP
 
 
-@pytest.mark.parametrize(
-    ("name", "isolation", "word"), [("fast", None, "'fast'"), ("compiled", Isolation(), "isolated")]
-)
-def test_what_is_no_loop_is_refused(library: object, name, isolation, word):
-    with pytest.raises(InputError, match=word):
-        choose_loop(name, LONG, isolation)
+def test_the_compiled_loop_cannot_step_isolated_fmus(library: object):
+    with pytest.raises(InputError, match="isolated"):
+        choose_loop("compiled", LONG, Isolation())

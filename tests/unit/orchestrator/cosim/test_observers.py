@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from hypothesis import strategies as st
 
 from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.experiment import Experiment, Order
-from orchestrator.cosim.observers import TABLE_FORMATS, Ending, Header, Progress, Selection, Table
+from orchestrator.cosim.observers import Ending, Header, Selection, Table, TableFile
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.texts import matches, matching
 from orchestrator.runs.tables import read_columns, read_rows
@@ -73,24 +71,6 @@ def test_patterns_are_names_groups_and_wildcards():
         matching(COLUMNS, ["a.z"])
 
 
-@pytest.mark.parametrize("kernel", [False, True])
-@pytest.mark.parametrize("widgets", [False, True])
-def test_bar_is_a_widget_in_a_notebook_that_has_widgets(monkeypatch, kernel, widgets):
-    made: list[str] = []
-
-    def module(name: str) -> SimpleNamespace:
-        return SimpleNamespace(tqdm=lambda **_: made.append(name))
-
-    monkeypatch.delitem(sys.modules, "ipykernel", raising=False)
-    if kernel:
-        monkeypatch.setitem(sys.modules, "ipykernel", SimpleNamespace())
-    where = "orchestrator.machine.progress"
-    monkeypatch.setattr(f"{where}.import_module", module)
-    monkeypatch.setattr(f"{where}.find_spec", lambda _: SimpleNamespace() if widgets else None)
-    Progress("fig4").begin(Header((), Experiment(1.0, 0.1)))
-    assert made == ["tqdm.notebook" if kernel and widgets else "tqdm"]
-
-
 def table(times: list[float], order: Order = "gauss-seidel") -> Table:
     """`a.t` holds the time; `a.start` the time at which the step of the row began, 0.1 s before."""
     t = np.array(times)
@@ -134,14 +114,14 @@ def test_more_rows_than_fit_are_refused_before_the_run():
         Table().begin(Header(("a.t",), Experiment(1e6, 0.01)))
 
 
-@pytest.mark.parametrize("ending", TABLE_FORMATS)
+@pytest.mark.parametrize("ending", TableFile.FORMATS)
 def test_what_is_written_is_read_again_exactly(tmp_path: Path, ending: str):
     if ending == "parquet":
         pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     path = tmp_path / f"result.{ending}"
     rows = np.random.default_rng(1).normal(scale=1e3, size=(20_001, 4))
     rows[5] = [1e-310, -0.0, 1.7976931348623157e308, np.nextafter(1.0, 2.0)]
-    file = TABLE_FORMATS[ending](path)
+    file = TableFile.at(path)
     file.begin(Header(("a.x", "a.y", "b.z"), Experiment(1.0, 0.1)))
     for block in np.split(rows, [1, 600, 19_000]):
         file.take(block)
@@ -159,7 +139,7 @@ def test_parquet_of_the_same_rows_is_the_same_file(tmp_path: Path):
     files = []
     for i, block in enumerate((512, 700, 20_000)):
         path = tmp_path / f"{i}.parquet"
-        file = TABLE_FORMATS["parquet"](path)
+        file = TableFile.at(path)
         file.begin(Header(("a.x",), Experiment(1.0, 0.1)))
         for start in range(0, len(rows), block):
             file.take(rows[start : start + block])

@@ -21,7 +21,6 @@ from orchestrator.cosim.events import Event, Stop
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
 from orchestrator.cosim.hooks import InputTable
-from orchestrator.cosim.loop import choose_loop
 from orchestrator.cosim.plan import make_plan
 from orchestrator.cosim.stages import arrange, gathered_connections
 from orchestrator.cosim.system import System
@@ -289,8 +288,11 @@ def made_in_another_way(run: Prepared, choice: Choice) -> Prepared:
     return replace(
         run,
         scenario=replace(run.scenario, name="another", title="Another", digest="1234"),
-        isolation=choice.random.choice([None, Isolation(20.0)]),
-        stepping=choose_loop(choice.random.choice(["python", "auto"]), run.experiment),
+        plan=replace(
+            run.plan,
+            isolation=choice.random.choice([None, Isolation(20.0)]),
+            loop=choice.random.choice(["python", "auto"]),
+        ),
     )
 
 
@@ -344,3 +346,8 @@ def test_code_is_part_of_a_run_where_it_makes_rows(monkeypatch, room, is_same):
     monkeypatch.setattr(plan, "code_of", plan.code_of.__wrapped__)
     monkeypatch.setattr(Path, "read_bytes", commented)
     assert (base().identity == before) == is_same
+
+
+def test_an_unknown_loop_is_refused_by_name():
+    with pytest.raises(InputError, match=r"loop 'fast': use one of auto, python, compiled"):
+        make_plan(base().system, base().experiment, loop="fast")

@@ -12,7 +12,7 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.hooks import Run
 from orchestrator.cosim.observers import Ending, Header, Table
 from orchestrator.cosim.plan import make_plan
-from orchestrator.cosim.simulation import simulate_plan, simulate_to_end
+from orchestrator.cosim.simulation import simulate_plan
 from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError
 from support.linear import SINE, Part, linear, system_of
@@ -84,7 +84,7 @@ def test_a_value_that_is_not_finite_ends_the_run_before_its_row(system: System):
     assert mentions(ending.failure, "0.125 sine.y0")
     assert len(table) == 1
     with pytest.raises(InputError, match="sine"):
-        simulate_to_end(make_plan(grows, EXPERIMENT))
+        ending.require_success("sine")
 
 
 @pytest.mark.parametrize("frozen", [False, True], ids=["not hashable", "equal"])

@@ -128,10 +128,9 @@ def told(stage: Stage) -> str:
     taken = " ".join(str(connection.target) for connection in stage.connections)
     done = [
         f"{one.component}{'' if one == Visit(one.component) else f'({how(one)})'}"
-        if isinstance(one, Visit)
-        else f"{one.how} {'-'.join(one.ring)}"
         for one in stage.visits
     ]
+    done += [f"{one.how} {'-'.join(one.ring)}" for one in stage.closings]
     return " ".join([f"{when}{taken}:", *done])
 
 

@@ -19,7 +19,6 @@ from orchestrator.cosim import (
     Header,
     PortName,
     Table,
-    choose_loop,
     make_plan,
     simulate_plan,
 )
@@ -162,9 +161,7 @@ def test_what_is_never_reached_is_not_there():
 def test_closed_loop_has_all_of_them():
     _, system = load_scenario("fig4", "native")
     experiment, observer = Experiment(4.0, 0.02), Indices()
-    simulate_plan(
-        make_plan(system, experiment), [observer], stepping=choose_loop("auto", experiment)
-    )
+    simulate_plan(make_plan(system, experiment, loop="auto"), [observer])
     found = observer.values().keys()
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
 

@@ -111,7 +111,7 @@ def run(system: System, n: int, length: float, outputs: list[float], note: bytes
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(isolated, "isolate_instances", answering_here)
-        simulate_plan(make_plan(system, Experiment(0.1 * STEPS, 0.1)), [table], Isolation())
+        simulate_plan(make_plan(system, Experiment(0.1 * STEPS, 0.1), Isolation()), [table])
     return table
 
 
