@@ -1,13 +1,12 @@
-"""What a run needs to go on in another process, written from time to time.
+"""Checkpoints, from which a run continues in another process.
 
-A folder holds two files. All rows so far are in the one that grows. The other is replaced as a
-whole, once the rows are on the disk: it says how many of them count, with their digest, and holds
-the states of the FMUs and whatever else a run knows, with a checksum over all. A process may be
-killed at any time: what it leaves is its last checkpoint. A random token in both files tells
-them from files of the user's.
+A folder holds two files. One grows and holds all rows so far. The other is replaced as a whole,
+once the rows are on the disk: it contains the number of valid rows, their digest, the states of the
+FMUs and the state of the run, with a checksum. A process may be killed at any time: it leaves its
+last checkpoint. A random token in both files distinguishes them from users' files.
 
-Observers have no state there. A run that is resumed tells them all rows again, from the first on,
-so any observer of a run can observe one that was resumed.
+Observers have no state there. A resumed run gives them all rows again, from the first on, so that
+any observer of a run can observe a resumed one.
 """
 
 from __future__ import annotations
@@ -33,18 +32,18 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.identity import Identity, differences
 from orchestrator.machine.operating_system import sync_to_disk
 
-#: The file that grows, and the one that is replaced.
+#: Names of the file of rows and of the file of the state.
 _ROWS, _STATE = "rows.bin", "state.json"
 
-#: A number in the file of rows, and how many rows are read at once.
+#: Type of a number in the file of rows, and number of rows that are read at once.
 _NUMBER, _AT_ONCE = np.dtype("<f8"), 4096
 
-#: The first bytes of that file, before a token, and how long both are together.
+#: First bytes of that file, before the token, and length of both together.
 _TITLE, _BEGIN = b"auv-fmu rows ", 64
 
 
 def begins(path: Path, token: str) -> bool:
-    """Whether a file of rows bears a token."""
+    """Return True for a file of rows with a token."""
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:
@@ -56,23 +55,23 @@ def _head(token: str) -> bytes:
 
 
 class RowLog:
-    """A file of rows, number after number, without anything between them.
+    """A file of rows: numbers without separators.
 
-    Rows that are there after those that count are compared with what comes in their place.
+    Rows after the valid ones are compared with the rows that replace them.
     """
 
     def __init__(self, path: Path, token: str, width: int, kept: int = 0, digest: str = "") -> None:
-        """Make the file, or go on after the first rows of one that is there.
+        """Create the file, or continue after the first rows of an existing one.
 
         Args:
             path: of the file.
-            token: that it begins with.
-            width: numbers in a row.
-            kept: how many of its rows count.
-            digest: of these.
+            token: at the beginning of the file.
+            width: number of values in a row.
+            kept: number of valid rows.
+            digest: of the valid rows.
 
         Raises:
-            InputError: they are not there, or not as they were.
+            InputError: they are missing or have changed.
 
         """
         self._path, self._width, self._kept = path, width, kept
@@ -93,7 +92,7 @@ class RowLog:
             )
         self._file = path.open("r+b")
         there = (path.stat().st_size - _BEGIN) // row
-        # A part of a row may follow.
+        # An incomplete row may follow.
         self._file.truncate(_BEGIN + there * row)
         self._file.seek(_BEGIN + kept * row)
         self._after = there - kept
@@ -102,7 +101,7 @@ class RowLog:
         """Write some rows.
 
         Returns:
-            Row and column of the first number that differs; None: none does.
+            Row and column of the first number that differs; None: no number differs.
 
         """
         content = rows.astype(_NUMBER, copy=False).tobytes()
@@ -116,17 +115,17 @@ class RowLog:
         return divmod(different, self._width)
 
     def _different(self, content: bytes) -> int | None:
-        """The index in the file of the first number that differs from the expected one."""
+        """Return the index of the first number in the file that differs."""
         place = self._file.tell()
         there = np.frombuffer(self._file.read(len(content)), np.uint64)
         self._file.seek(place)
-        # Bit for bit: zero is not minus zero.
+        # Compared bit for bit: zero is not minus zero.
         changed = np.flatnonzero(there != np.frombuffer(content, np.uint64)[: len(there)])
         self._after -= len(there) // self._width
         return int(changed[0]) if len(changed) else None
 
     def kept(self) -> Iterator[np.ndarray]:
-        """The rows that were there before, some thousand at a time."""
+        """Yield the valid rows, some thousand at a time."""
         with self._path.open("rb") as file:
             file.seek(_BEGIN)
             for first in range(0, self._kept, _AT_ONCE):
@@ -137,7 +136,7 @@ class RowLog:
                 yield numbers.astype(float, copy=False).reshape(n, self._width)
 
     def to_disk(self) -> str:
-        """Have all rows outlast the process, and a power cut; their digest is given back."""
+        """Flush all rows to the disk, and return their digest."""
         self._file.flush()
         sync_to_disk(self._path)
         return self._digest.hexdigest()
@@ -148,17 +147,17 @@ class RowLog:
 
 
 class _Stored(NamedTuple):
-    """What the file that is replaced holds.
+    """Content of the file of the state.
 
     Attributes:
-        identity: the token of both files, by the name that files on disks have for it.
-        every: for how many seconds a checkpoint was written [s].
-        of: the run.
-        time, made: how far the run had come [s], and in how many steps; None: no row counts yet.
-        n_rows, rows: how many rows count, and the digest of all of them.
-        row: all values, hidden ones too.
+        identity: token of both files, under the name that files on disks use for it.
+        every: interval of the checkpoints [s].
+        of: identity of the run.
+        time, made: time [s] and number of steps of the checkpoint; None: no row is valid yet.
+        n_rows, rows: number of valid rows, and their digest.
+        row: all values, including the hidden ones.
         states: of the FMUs, as base64.
-        lasting: what else there was to remember.
+        lasting: states of the overrides, the log and the hooks.
 
     """
 
@@ -175,9 +174,9 @@ class _Stored(NamedTuple):
 
 
 class Checkpoints:
-    """An observer and hook that writes checkpoints, and begins with the one that it finds.
+    """An observer and hook that writes checkpoints, and continues from an existing one.
 
-    As a hook it comes first: what others do at the same time belongs to what follows.
+    It must be the first hook: the actions of others at the same time belong to the next steps.
 
     Attributes:
         folder: of the checkpoint.
@@ -187,10 +186,10 @@ class Checkpoints:
 
     @staticmethod
     def check(every: float) -> None:
-        """Check before a run that there can be a checkpoint for so many seconds.
+        """Check an interval before a run.
 
         Raises:
-            InputError: they are not positive, or not finite.
+            InputError: it is not positive and finite.
 
         """
         if not (isfinite(every) and every > 0.0):
@@ -221,13 +220,13 @@ class Checkpoints:
         Args:
             folder: of the checkpoint.
             identity: of the run.
-            every: a checkpoint for so many simulated seconds [s].
-            resume: begin with the one that is there, if there is one.
-            force: move aside what is there otherwise.
-            token: random, for a new checkpoint; empty: one is drawn.
+            every: interval of the checkpoints in simulated time [s].
+            resume: if set, continue from an existing checkpoint.
+            force: if set, move another checkpoint or file aside.
+            token: random, for a new checkpoint; empty: it is drawn.
 
         Raises:
-            InputError: the checkpoint there is not asked for, or not the right one.
+            InputError: there is a checkpoint that was not asked for, or of another run.
 
         """
         Checkpoints.check(every)
@@ -238,11 +237,11 @@ class Checkpoints:
         self.time: float | None = None if self._found is None else self._found.time
 
     def _look(self, resume: bool, force: bool) -> _Stored | None:
-        """The checkpoint that is there, which the run goes on with."""
+        """Return the existing checkpoint, from which the run continues."""
         try:
             found = _read(self.folder)
             rows = self.folder / _ROWS
-            # A process that was killed when it began may have left an empty file of rows.
+            # A process that was killed at its begin may have left an empty file of rows.
             is_empty = rows.is_file() and not rows.is_symlink() and not rows.stat().st_size
             is_ours = found and (is_empty or begins(rows, found.identity))
             if os.path.lexists(rows) and not is_ours:
@@ -277,7 +276,7 @@ class Checkpoints:
         rows, width, found = self.folder / _ROWS, len(self._columns), self._found
         if found is None or found.time is None:
             self._known, digest = 0, ""
-            # First the proof that the file of rows is ours.
+            # The token is stored first, as a proof that the file of rows is ours.
             self.folder.mkdir(parents=True, exist_ok=True)
             self._store()
             rows.unlink(missing_ok=True)
@@ -286,7 +285,7 @@ class Checkpoints:
         self._row_log = RowLog(rows, self._token, width, self._known, digest)
 
     def take(self, rows: np.ndarray) -> None:
-        """Write some rows, except the ones that are told again."""
+        """Write some rows, except those that are repeated."""
         again = min(self._known, len(rows))
         self._known -= again
         new = rows[again:]
@@ -302,7 +301,7 @@ class Checkpoints:
         self._row_log.close()
 
     def act(self, run: Run) -> int:
-        """Write a checkpoint, or begin with one."""
+        """Write a checkpoint, or continue from one."""
         self._log = run.log
         found, self._found = self._found, None
         if found is not None and found.time is not None:
@@ -317,14 +316,14 @@ class Checkpoints:
         """Remove the files that a finished run no longer needs."""
         found, rows = _read(self.folder), self.folder / _ROWS
         if found is not None and found.identity == self._token:
-            # While there are rows, there is the proof that they are ours.
+            # The file with the token is removed last, as a proof that the rows are ours.
             self._store()
             if begins(rows, self._token):
                 rows.unlink()
             (self.folder / _STATE).unlink()
         self._partial.unlink(missing_ok=True)
         with suppress(OSError):
-            # Fails where there is something in it.
+            # Fails if the folder is not empty.
             self.folder.rmdir()
 
     def _write(self, run: Run) -> None:
@@ -355,10 +354,10 @@ class Checkpoints:
         write_whole(self.folder / _STATE, sealed(content._asdict()), self._partial)
 
     def _resume(self, run: Run, found: _Stored) -> None:
-        # First of all what rows mean: an observer that is told them needs it.
+        # The meaning of rows is restored first: observers that get them need it.
         for one, state in zip(_lasting(run), found.lasting, strict=True):
             one.restore(state)
-        first = run.blocks.count  # which was computed anew
+        first = run.blocks.count  # computed again
         for rows in self._row_log.kept():
             run.blocks.tell(rows[first:])
             run.made += len(rows) - first
@@ -387,7 +386,7 @@ def _read(folder: Path) -> _Stored | None:
 
 @contextmanager
 def _explained(path: Path) -> Iterator[None]:
-    """Name the file of a checkpoint that is damaged or is not one."""
+    """Name the file of a damaged checkpoint."""
     try:
         yield
     except InputError:

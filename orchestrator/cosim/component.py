@@ -1,4 +1,4 @@
-"""An FMU and what its description says about it."""
+"""An FMU and its description."""
 
 from __future__ import annotations
 
@@ -31,34 +31,34 @@ _CAUSALITIES = {
     "independent",
 }  # fmt: skip
 
-#: Attributes that fmpy reads as Python reads numbers, which takes 1_000, and digits of any script.
+#: Attributes that fmpy reads like numbers of Python, which include 1_000, and digits of any script.
 _INTEGERS = {
     "kg", "m", "s", "A", "K", "mol", "cd", "rad", "valueReference", "value", "index",
     "dependencies", "derivative", "previous", "clocks",
 }  # fmt: skip
 _REALS = {"factor", "offset", "min", "max"}
 
-#: Attributes that hold several numbers.
+#: Attributes with several numbers.
 _LISTS = {"dependencies", "clocks"}
 
-#: Elements in which the same words may stand for something else.
+#: Elements in which attributes of these names may have other meanings.
 _OTHERS = {"VendorAnnotations", "Annotations", "Start"}
 
-#: The versions of FMI that FMUs may have.
+#: Supported versions of FMI.
 _VERSIONS = ("2.0", "3.0")
 
-#: How this program names itself in descriptions of FMUs.
+#: Prefix of this program's name in descriptions of FMUs.
 _OWN = "auv-fmu "
 
 
 class Described(NamedTuple):
-    """A description, and its flaw; None: it is valid."""
+    """A description and its flaw; None: it is valid."""
 
     description: ModelDescription
     flaw: Exception | None
 
     def remark(self) -> str | None:
-        """What is wrong with it, in some words."""
+        """Describe the flaw in one line."""
         if isinstance(self.flaw, ValidationError):
             first, *others = map(str, self.flaw.problems)
             return first + f" (and {len(others)} more problems)" * bool(others)
@@ -66,10 +66,10 @@ class Described(NamedTuple):
 
 
 def read_description(folder: Path) -> Described:
-    """The description in the folder of an unpacked FMU, be it valid or not.
+    """Read the description in the folder of an unpacked FMU, valid or not.
 
     Raises:
-        Exception: it cannot be read; whatever it is, it says why.
+        Exception: of any kind; it cannot be read.
 
     """
     flaw: Exception | None = None
@@ -88,7 +88,7 @@ def read_description(folder: Path) -> Described:
 
 @lru_cache(maxsize=256)
 def described(fmu: Path, folder: Path) -> Described:
-    """The description of an FMU for co-simulation, read once.
+    """Read the description of an FMU for co-simulation, once.
 
     Args:
         fmu: the file.
@@ -103,7 +103,7 @@ def described(fmu: Path, folder: Path) -> Described:
         raise InputError(f"{fmu}: not a readable FMU: it holds no {file.name}")
     try:
         root: ElementTree.Element
-        # The version comes first: all else differs between them.
+        # The version is tested first, since everything else depends on it.
         with file.open("rb") as source:
             _, root = next(ElementTree.iterparse(source, ["start"]))
         version = root.get("fmiVersion")
@@ -139,7 +139,7 @@ def described(fmu: Path, folder: Path) -> Described:
 
 
 def _misread(file: Path) -> Iterator[str]:
-    """Numbers of a description that Python would misread, or that are not numbers."""
+    """Yield a line for each number that Python would misread, or that is not a number."""
     for element in _elements(ElementTree.parse(file).getroot()):
         if element.tag == "Item":
             for name in sorted({"name", "value"} - element.attrib.keys()):
@@ -155,7 +155,7 @@ def _misread(file: Path) -> Iterator[str]:
 
 
 def _elements(parent: ElementTree.Element) -> Iterator[ElementTree.Element]:
-    """All elements in another one, except some."""
+    """Yield all elements in another one, except vendors' and start values."""
     for element in parent:
         if element.tag not in _OTHERS:
             yield element
@@ -169,8 +169,8 @@ class Component:
     Attributes:
         name: of the instance.
         fmu: the file.
-        description: what its modelDescription.xml says.
-        digest: SHA-256 of the file as it was read. That is what runs, and what records name.
+        description: of modelDescription.xml.
+        digest: SHA-256 of the file as it was read, which runs and which records name.
 
     """
 
@@ -181,32 +181,32 @@ class Component:
 
     @property
     def folder(self) -> Path:
-        """The folder into which it has been unpacked.
+        """Folder of the unpacked FMU.
 
         Raises:
-            InputError: it was read in another process, and the file is another one now.
+            InputError: it was read in another process, and the file has changed.
 
         """
         return unpacked_folder(self.fmu, self.digest)
 
     @cached_property
     def variables(self) -> Mapping[str, Variable]:
-        """The FMU's variables by name, except the ones that are left alone."""
+        """The FMU's supported variables by name."""
         return variables_of(self.description).known
 
     @property
     def unsupported(self) -> Mapping[str, str]:
-        """Why others cannot be connected, set or recorded, by name."""
+        """Reasons why other variables are not supported, by name."""
         return variables_of(self.description).unsupported
 
     @property
     def remainder(self) -> str:
-        """Which variables are left alone, in words."""
+        """Line about the unsupported variables."""
         return f"{shortened(', '.join(self.unsupported))}: not supported, and ignored"
 
     @cached_property
     def arrays(self) -> dict[str, list[Variable]]:
-        """The elements of each array, in their order."""
+        """Elements of each array, in their order."""
         found: dict[str, list[Variable]] = {}
         for variable in self.variables.values():
             if variable.shape:
@@ -215,7 +215,7 @@ class Component:
 
     @cached_property
     def terminals(self) -> dict[str, Terminal]:
-        """Its terminals by their names.
+        """Terminals by name.
 
         Raises:
             InputError: the file that lists them cannot be read.
@@ -233,38 +233,38 @@ class Component:
 
     @property
     def is_ours(self) -> bool:
-        """Whether this program has built the FMU."""
+        """True if this program has built the FMU."""
         return (self.description.generationTool or "").startswith(_OWN)
 
     @property
     def is_once_per_process(self) -> bool:
-        """Whether a process may hold one instance of the FMU only."""
+        """True if a process may hold only one instance of the FMU."""
         return bool(self.description.coSimulation.canBeInstantiatedOnlyOncePerProcess)
 
     @property
     def takes_any_step(self) -> bool:
-        """Whether its steps may differ in length."""
+        """True if its steps may differ in length."""
         return bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
 
     @property
     def gives_derivatives(self) -> bool:
-        """Whether it can say how outputs change with inputs."""
+        """True if it provides derivatives of outputs by inputs."""
         return bool(self.description.coSimulation.providesDirectionalDerivative)
 
     @property
     def takes_linear_inputs(self) -> bool:
-        """Whether it can go back to the beginning of a step, and its inputs change in one."""
+        """True if it can go back to the beginning of a step and interpolate inputs."""
         of = self.description.coSimulation
         return bool(of.canGetAndSetFMUstate and of.canInterpolateInputs)
 
     @property
     def gives_state(self) -> bool:
-        """Whether its whole state can be had as bytes, and taken on from them."""
+        """True if its whole state can be saved as bytes and restored."""
         of = self.description.coSimulation
         return bool(of.canGetAndSetFMUstate and of.canSerializeFMUstate)
 
     def variable(self, name: str) -> Variable:
-        """One variable of the FMU.
+        """Return one variable of the FMU.
 
         Raises:
             InputError: there is no such variable.
@@ -279,7 +279,7 @@ class Component:
         return self.variables[name]
 
     def elements(self, name: str) -> list[Variable]:
-        """The elements of an array, or a scalar variable.
+        """Return the elements of an array, or a scalar variable.
 
         Raises:
             InputError: there is no such variable.
@@ -288,11 +288,11 @@ class Component:
         return self.arrays.get(name) or [self.variable(name)]
 
     def having(self, causality: str) -> list[Variable]:
-        """The variables of one causality, in the order of the description."""
+        """Return the variables of one causality, in the order of the description."""
         return [v for v in self.variables.values() if v.causality == causality]
 
     def start(self, name: str) -> Value | None:
-        """The start value of a variable, in its type; None: its description names none.
+        """Return the start value of a variable, in its type; None: the description has none.
 
         Raises:
             InputError: there is no such variable.
@@ -305,11 +305,11 @@ class Component:
 
     @property
     def starts(self) -> Mapping[str, Value]:
-        """Start values that the description names, except nonsense, which is of no use."""
+        """Valid start values of the description."""
         return _starts_of(self.description)
 
     def experiment(self, name: str) -> float | None:
-        """What its DefaultExperiment says, such as `stopTime` [s]; None: no number, or nothing."""
+        """Return a number of its DefaultExperiment, such as `stopTime` [s]; None: it has none."""
         stated = getattr(self.description.defaultExperiment, name, None)
         with suppress(ValueError):
             return None if stated is None else finite(stated, name)
@@ -317,12 +317,12 @@ class Component:
 
     @property
     def step(self) -> float | None:
-        """The step that the FMU was made for [s]; None: it names none."""
+        """Step that the FMU was made for [s]; None: the description has none."""
         step = self.experiment("stepSize")
         return step if step is not None and step > 0.0 else None
 
     def is_settable(self, name: str) -> bool:
-        """Whether a variable takes a value before the first step (FMI 2.0.4, section 2.2.7).
+        """Return True for a variable that can be set before a run (FMI 2.0.4, section 2.2.7).
 
         Raises:
             InputError: there is no such variable.
@@ -332,17 +332,17 @@ class Component:
         return variable.causality == "input" or (
             variable.variability != "constant"
             and variable.initial in ("exact", "approx")
-            # Sizes of arrays are the ones that the description begins with.
+            # Arrays keep the sizes of the description.
             and variable.causality != "structuralParameter"
         )
 
     def is_continuous(self, name: str) -> bool:
-        """Whether a variable may change at any time (FMI 2.0.4, section 2.2.7)."""
+        """Return True for a variable that may change at any time (FMI 2.0.4, section 2.2.7)."""
         variable = self.variable(name)
         return variable.family == "Real" and variable.variability in (None, "continuous")
 
     def has_feedthrough(self, output: str) -> bool:
-        """Whether an output depends on an input of the same instant."""
+        """Return True for an output that depends on an input of the same instant."""
         return output in self._feedthrough
 
     @cached_property
@@ -350,7 +350,7 @@ class Component:
         return _feedthrough_of(self.description)
 
 
-# What all components of an FMU share is found once: there may be thousands of them.
+# Shared by all components of an FMU, of which there may be thousands.
 
 
 @lru_cache(maxsize=256)
@@ -365,7 +365,7 @@ def _starts_of(description: ModelDescription) -> Mapping[str, Value]:
 
 @lru_cache(maxsize=256)
 def _feedthrough_of(description: ModelDescription) -> frozenset[str]:
-    """An FMU that does not say must be taken to have it (FMI 2.0.4, section 2.2.8)."""
+    """Outputs without stated dependencies count, too (FMI 2.0.4, section 2.2.8)."""
     free = {
         unknown.variable.name
         for unknown in description.outputs
@@ -386,15 +386,15 @@ def read_component(
     fmu: Path,
     findings: Findings | None = None,
 ) -> Component:
-    """An FMU as a component.
+    """Read an FMU as a component.
 
     Args:
         name: of the instance.
         fmu: the file.
-        findings: take notes of harmless flaws in its description.
+        findings: receives notes on harmless flaws of its description.
 
     Raises:
-        InputError: the file is missing or is not such an FMU for co-simulation.
+        InputError: the file is missing, or is not an FMU for co-simulation.
 
     """
     folder, digest = unpack(fmu)

@@ -1,4 +1,4 @@
-"""Connections of ports: names, units, and what a value becomes on its way."""
+"""Connections of ports: names, units, and transformations of values."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class PortName:
 
     @classmethod
     def read(cls, text: str) -> PortName:
-        """Take `component.port` apart at the first dot.
+        """Split `component.port` at the first dot.
 
-        A component's name may have dots as well: only the system knows which of them ends it
+        A component's name may contain dots, too: only the system can tell which of them ends it
         (:meth:`.system.System.named`).
 
         Raises:
@@ -44,7 +44,7 @@ class PortName:
 
     @staticmethod
     def splits(text: str) -> Iterator[tuple[str, str]]:
-        """The ways to take a name apart, the longest name of a component first."""
+        """Yield the ways to split a name, the longest name of a component first."""
         dot = text.rfind(".")
         while dot >= 0:
             yield text[:dot], text[dot + 1 :]
@@ -52,7 +52,7 @@ class PortName:
 
 
 def likely_port(name: PortName, components: Collection[str]) -> PortName:
-    """A name that begins with no component, taken apart after the systems that it begins with."""
+    """Split a name that begins with no component after the systems that it begins with."""
     outer, inner = name.component, name.port
     while "." in inner and any(one.startswith(f"{outer}.") for one in components):
         part, _, inner = inner.partition(".")
@@ -60,10 +60,10 @@ def likely_port(name: PortName, components: Collection[str]) -> PortName:
     return PortName(outer, inner)
 
 
-#: Values of a mapping that is made of several.
+#: Largest number of pairs of a combined mapping.
 _MOST_PAIRS = 1000
 
-#: The base units of FMI 2.0 and SSP 1.0, in the order of :attr:`Unit.exponents`.
+#: Base units of FMI 2.0 and SSP 1.0, in the order of :attr:`Unit.exponents`.
 BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
 
 
@@ -78,23 +78,23 @@ class Linear:
     UNCHANGED: ClassVar[tuple[float, float]] = (1.0, -0.0)
 
     def __call__(self, value: float) -> float:
-        """The value that arrives."""
+        """Return the value that arrives."""
         return self.factor * value + self.offset
 
 
 @dataclass(frozen=True)
 class Mapped:
-    """The target takes what stands beside the source's value; any other value stays as it is.
+    """The target takes the value that is listed for the source's; any other value stays as it is.
 
     Attributes:
-        pairs: values of source and target, truth values as zero and one, integers exact.
+        pairs: values of source and target; Booleans as zero and one, integers exact.
 
     """
 
     pairs: tuple[tuple[float, float], ...]
 
     def __call__(self, value: float) -> float:
-        """The value that arrives."""
+        """Return the value that arrives."""
         return dict(self.pairs).get(value, value)
 
 
@@ -102,14 +102,14 @@ Transformation: TypeAlias = Linear | Mapped
 
 
 def combine(first: Transformation | None, then: Transformation | None) -> Transformation | None:
-    """Combine two transformations, one after the other; None leaves a value as it is.
+    """Combine two successive transformations; None leaves a value as it is.
 
     Raises:
-        InputError: one is linear, and the other a table; no number holds what they come to; or
-            together they are too long a table.
+        InputError: one is linear and the other a mapping; the result is not a finite number; or the
+            combined mapping is too long.
 
     """
-    # An identity is kept only if there is no other.
+    # An identity is kept only if there is nothing else.
     for nothing in (None, Linear()):
         if first == nothing:
             return then
@@ -139,8 +139,8 @@ class Unit:
     """A unit: a value in base units is factor * value + offset.
 
     Attributes:
-        name: as connectors and variables write it.
-        exponents: of :data:`BASE_UNITS`; None: nothing defines this unit.
+        name: as in connectors and variables.
+        exponents: of :data:`BASE_UNITS`; None: the unit is not defined.
 
     """
 
@@ -151,7 +151,7 @@ class Unit:
 
 
 class UndefinedUnit(InputError):
-    """A value is to go from one unit to another, of which nothing defines one."""
+    """A conversion between two units, one of which is not defined."""
 
 
 #: Units by their names.
@@ -159,7 +159,7 @@ Units = Mapping[str, Unit]
 
 
 def defined(component: Component, name: str) -> Unit:
-    """A unit as an FMU defines it."""
+    """Return a unit as an FMU defines it."""
     for unit in component.description.unitDefinitions:
         if unit.name == name and unit.baseUnit is not None:
             base: Any = unit.baseUnit
@@ -169,12 +169,12 @@ def defined(component: Component, name: str) -> Unit:
 
 
 def unit_of_port(component: Component, port: str, otherwise: Units | None = None) -> Unit | None:
-    """The unit of a variable; None: it names none.
+    """Return the unit of a variable; None: it has none.
 
     Args:
-        component: whose variable it is.
-        port: its name.
-        otherwise: units that are defined elsewhere, for one that the FMU does not define.
+        component: with the variable.
+        port: name of the variable.
+        otherwise: units that are defined elsewhere, for a unit that the FMU does not define.
 
     """
     variable = component.variable(port)
@@ -184,15 +184,15 @@ def unit_of_port(component: Component, port: str, otherwise: Units | None = None
     unit = defined(component, name)
     if unit.exponents is None:
         unit = (otherwise or {}).get(name, unit)
-    # A difference of two temperatures has no zero that could be shifted.
+    # A difference of two temperatures has no zero to be shifted.
     return replace(unit, offset=0.0) if variable.is_relative else unit
 
 
 def conversion(source: Unit | None, target: Unit | None) -> Linear | None:
-    """From one unit to another; None: the value stays as it is.
+    """Return the conversion from one unit to another; None: the value stays as it is.
 
     Raises:
-        InputError: they measure different things.
+        InputError: they measure different quantities.
         UndefinedUnit: one of them is not defined.
 
     """
@@ -219,18 +219,18 @@ def conversion(source: Unit | None, target: Unit | None) -> Linear | None:
     return Linear(factor, offset)
 
 
-#: What can be fed from another family of types, besides from its own.
+#: Families of types that can feed another family.
 _FED_FROM = {"Real": ("Integer",), "Integer": ("Enumeration",), "Enumeration": ("Integer",)}
 
 
 @dataclass(frozen=True)
 class Connection:
-    """One value that goes from an output to an input.
+    """A value that goes from an output to an input.
 
     Attributes:
         source, target: its ends.
-        transformation: what happens to the value on its way; None: it arrives bit for bit, and the
-            units of its ends must be the same.
+        transformation: of the value on its way; None: it arrives bit for bit, and both ends must
+            have the same unit.
 
     """
 
@@ -281,11 +281,11 @@ class Connection:
 
 
 def check_connection(connection: Connection, component: Callable[[str], Component]) -> None:
-    """Check that the ends of a connection exist, and fit.
+    """Check that the ends of a connection exist and fit.
 
     Args:
         connection: of a system.
-        component: of that system, by its name.
+        component: returns a component of that system by its name.
 
     Raises:
         InputError: a port does not exist, or they do not fit.
@@ -316,7 +316,7 @@ def check_connection(connection: Connection, component: Callable[[str], Componen
 
 
 def can_feed(source: Variable, target: Variable) -> bool:
-    """Whether a variable takes all values of another, and none is lost on the way."""
+    """Return True if a variable takes all values of another one without loss."""
     start, end = TYPES[source.type], TYPES[target.type]
     if start.family not in (end.family, *_FED_FROM.get(end.family, ())):
         return False
@@ -326,7 +326,7 @@ def can_feed(source: Variable, target: Variable) -> bool:
 
 
 def _check_transformed(connection: Connection, fmi_type: str) -> None:
-    """Refuse to compute with anything but numbers, and to make fractions of whole ones."""
+    """Refuse to transform anything but numbers, and to make fractions of integers."""
     wire = f"{connection.source} -> {connection.target}"
     of = TYPES[fmi_type]
     is_real = of.family == "Real"

@@ -1,4 +1,4 @@
-"""The coupling of components: at the start, and in every step."""
+"""The coupling of components, at the start and in every step."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ from orchestrator.cosim.stages import (
 from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError, StartError, shortened
 
-#: Values go along all connections so often, until they rest.
+#: Limit of the rounds in which values go along all connections until they rest.
 _MOST_ROUNDS = 1000
 
 
 class _Single:
-    """A component of no ring: see :class:`.ring.Ring`."""
+    """A component outside all rings: see :class:`.ring.Ring`."""
 
     def __init__(self, system: System, instance: Instance, row: Row) -> None:
         self.names = [instance.name]
@@ -62,27 +62,27 @@ class _Single:
 
 
 class _Settling:
-    """Values handed along all connections at one time, until every input has what feeds it."""
+    """Exchange of values along all connections at one time, until every input has what feeds it."""
 
     def __init__(self, units: Sequence[Ring | _Single], row: Row) -> None:
-        """Take what feeds each other, in the order of direct feedthroughs."""
+        """Take rings and single components, in the order of direct feedthroughs."""
         self._units, self._row = units, row
 
     @property
     def gatherings(self) -> list[Gathering]:
-        """All that it gathers."""
+        """Everything that is gathered."""
         return [gather for unit in self._units for gather in unit.gatherings]
 
     @property
     def places(self) -> dict[str, int]:
-        """The place of each component in that order."""
+        """Place of each component in that order."""
         return {name: i for i, unit in enumerate(self._units) for name in unit.names}
 
     def settle(self) -> None:
-        """Hand values on until they rest.
+        """Exchange values until they rest.
 
         Raises:
-            ComponentFailed: they do not come to rest, or a component fails.
+            ComponentFailed: the values do not come to rest, or a component fails.
 
         """
         for _ in range(_MOST_ROUNDS):
@@ -96,10 +96,10 @@ class _Settling:
             )
 
     def hand_on(self, everything: bool = False) -> bool:
-        """Hand values along all connections once; whether any input has changed.
+        """Exchange values along all connections once, and return True if any input has changed.
 
         Args:
-            everything: also to components whose inputs are what they were.
+            everything: if set, also step components whose inputs have not changed.
 
         """
         changed = [unit.renew(everything) for unit in self._units]
@@ -109,10 +109,10 @@ class _Settling:
 class _LinearSteps:
     """Steps in which inputs change linearly from one communication point to the next.
 
-    Every step is made twice. The first time all inputs are held, which says what they come to at
-    its end; then the components go back to its beginning, and make it with inputs that change to
-    these values. The error of what is coupled falls with the square of the step, where held inputs
-    give its first power.
+    Every step is made twice. The first time all inputs are held, which gives their values at its
+    end; then the components go back to its beginning, and make it with inputs that change to these
+    values. The error of coupled values falls with the square of the step, with held inputs only
+    with the step.
     """
 
     def __init__(
@@ -127,7 +127,7 @@ class _LinearSteps:
             for instance in self._fed
             for variable in system.components[instance.name].having("input")
         ]
-        #: References and columns of the inputs of each that change.
+        #: References and columns of the changing inputs of each component.
         self._changing: list[tuple[list[int], list[int]]] = []
         for instance in self._fed:
             component = system.components[instance.name]
@@ -159,10 +159,10 @@ class _LinearSteps:
 
 
 class Coupling:
-    """The rings of direct feedthroughs of a system, and what follows from them.
+    """The rings of direct feedthroughs of a system, and the stages that follow from them.
 
     Attributes:
-        plan: of the run; once components are initialised, with the order that is taken.
+        plan: of the run; after initialisation, with the order that the run takes.
 
     """
 
@@ -177,10 +177,10 @@ class Coupling:
         """Find the rings.
 
         Args:
-            plan: the system, and how rings are closed.
+            plan: the system, and the way in which rings are closed.
             instances: of its components.
             row: that they are tied to.
-            log: takes where a ring is delayed.
+            log: receives a remark for each ring that is delayed.
             exchange: of values.
 
         """
@@ -191,11 +191,11 @@ class Coupling:
         self._solved: list[Ring] = []
 
     def initialise(self) -> None:
-        """Set parameters, exchange values in initialisation mode until they rest, leave that mode.
+        """Set parameters, then exchange values in initialisation mode until they rest.
 
         Raises:
-            InputError: the values do not come to rest, an FMU refused a value, or a ring is to be
-                solved that cannot be, or the order cannot be taken.
+            InputError: the values do not come to rest, an FMU refuses a value, a ring cannot be
+                solved that has to be, or the order is not possible.
             StartError: a value is not finite.
 
         """
@@ -225,7 +225,7 @@ class Coupling:
             raise InputError("; ".join(self._log.refusals))
 
     def stages(self) -> tuple[Stages[LinkedStage], list[Gathering]]:
-        """The stages of every step, and all that is gathered in one."""
+        """Return the stages of every step, and everything that they gather."""
         system, instances, row = self._system, self._instances, self._row
         if self._experiment.coupling == LINEAR:
             settling = self._settling(self.plan.arrangement, self._solved)
@@ -239,10 +239,10 @@ class Coupling:
         return stages, gatherings + own
 
     def _order_taken(self) -> Order:
-        """The order that is asked for, or else the best one that the FMUs allow.
+        """Return the order that is asked for, or else the best one that the FMUs allow.
 
         Raises:
-            InputError: values cannot pass through an FMU, and no other order will do.
+            InputError: values cannot pass through an FMU, and the order is stated.
 
         """
         order = self._experiment.order
@@ -253,7 +253,8 @@ class Coupling:
         tried: set[str] = set()
         for connection in self._system.connections:
             component = self._system.components[connection.source.component]
-            # Ours do what they declare, also where nothing happens to follow, as in a calm sea.
+            # Our FMUs do what they declare, even where no output happens to follow, as in a calm
+            # sea.
             if component.is_ours or component.digest in tried:
                 continue
             if not self._system.has_feedthrough(connection):
@@ -266,15 +267,15 @@ class Coupling:
         return FEEDTHROUGH
 
     def _arranged(self, order: Order) -> Arrangement:
-        """The components in an order, and the rings that are solved in every step.
+        """Arrange the components in an order, and find the rings that every step solves.
 
         Raises:
-            InputError: a ring is to be solved that cannot be.
+            InputError: a ring cannot be solved that has to be.
 
         """
         system, coupling = self._system, self._experiment.coupling
         if coupling == LINEAR:
-            # Where outputs are computed in steps only, the second one has them right.
+            # Outputs that are computed only in steps are right after the second one.
             return arrange(system, order, self.plan.rings)
         reasons: dict[str, str] = {}
         if coupling == DELAY or self._exchange.groups:
@@ -310,7 +311,7 @@ class Coupling:
         return _Settling(units, self._row)
 
     def _read_ahead(self, places: Mapping[str, int]) -> None:
-        """Read outputs that feed a component before it is their own component's turn."""
+        """Read outputs that feed a component which is initialised before their own."""
         wanted: dict[str, dict[str, None]] = {}
         for connection in self._system.connections:
             source, target = connection.source, connection.target
@@ -320,7 +321,7 @@ class Coupling:
             self._enter(name, list(ports))
 
     def _enter(self, name: str, ports: Sequence[str]) -> None:
-        """Enter the values that an FMU holds into the row."""
+        """Enter values that an FMU holds into the row."""
         held = self._instances[name].read(ports)
         self._row.enter({PortName(name, port): value for port, value in held.items()})
 

@@ -1,11 +1,11 @@
-"""What happens to a run from outside: at a time, or when a signal crosses a value.
+"""Events of a run: at a time, or when a signal crosses a value.
 
-An event acts between two steps, at the first t_k that its time is not after, or after the first
-step at whose end its condition has become true. The step that begins there is the first that it
-acts on, in every order and loop. In feedthrough order the row of that time shows what it does.
+An event acts between two steps: at the first t_k at or after its time, or after the first step at
+whose end its condition has become true. The step that begins there is the first one with the event,
+in every order and loop. In feedthrough order the row of that time shows its effect.
 
-Several events may act on one signal or parameter: the latest counts, and when it ends, the one
-before it counts again.
+If several events act on one signal or parameter, the latest counts; when it ends, the one before it
+counts again.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from orchestrator.cosim.row import Row
 from orchestrator.cosim.variables import Value, same
 from orchestrator.machine.texts import literal
 
-#: How often the same event is listed: a condition may chatter for ever.
+#: Limit for listing the same event: a condition may chatter endlessly.
 MOST_LISTED = 1000
 
 
 @dataclass(frozen=True)
 class Condition:
-    """A signal, as the row shows it, compared with a number."""
+    """A comparison of a signal, as the row shows it, with a number."""
 
-    #: Comparisons, as a scenario writes them.
+    #: Comparisons in scenarios.
     COMPARISONS: ClassVar[Mapping[str, Callable[[Any, float], bool]]] = {
         "<=": operator.le,
         ">=": operator.ge,
@@ -44,21 +44,21 @@ class Condition:
     value: float
 
     def holds(self, row: Row) -> bool:
-        """Whether it is true of a row."""
+        """Return True if the condition holds for a row."""
         return self.COMPARISONS[self.comparison](row.value(self.signal), self.value)
 
     def __str__(self) -> str:
-        """As a scenario writes it."""
+        """Format as in a scenario."""
         return f"{self.signal} {self.comparison} {self.value:g}"
 
 
 class Layer(NamedTuple):
-    """What an event does at one place.
+    """The effect of an event at one place.
 
     Attributes:
-        event: its number; :data:`_GROUND` stands for the value before any event.
+        event: its number; :data:`_GROUND` for the value without events.
         effect: a key of :data:`_EFFECTS`.
-        value: that goes with it.
+        value: of the effect.
 
     """
 
@@ -79,7 +79,7 @@ def _tune(run: Run, target: PortName, value: Value) -> None:
             f"{target} was set to {literal(value)}, but the FMU holds {literal(held)}"
         )
     if run.passing is not None:
-        # Outputs that follow from it are of now.
+        # Outputs that follow from the parameter must show its new value.
         instance.exchange()
 
 
@@ -91,19 +91,19 @@ _EFFECTS: Mapping[str, Callable[[Run, PortName, Any], None]] = {
     "tune": _tune,
 }
 
-#: Kinds that give an input or a parameter its value; the others alter what an input has or takes.
+#: Effects that give an input or a parameter a value; the others change what an input takes.
 _SETTING = ("supply", "tune")
 
 
 class Layers:
-    """What events do at all places, one upon the other."""
+    """Effects of events at all places, in layers."""
 
     def __init__(self) -> None:
-        """Begin with none."""
+        """Start empty."""
         self._at: dict[tuple[PortName, bool], list[Layer]] = {}
 
     def put(self, run: Run, target: PortName, layer: Layer) -> None:
-        """Lay something upon whatever acts at a place."""
+        """Put an effect on top of the others at a place."""
         place = target, layer.effect in _SETTING
         layers = self._at.setdefault(place, [])
         if not layers:
@@ -112,19 +112,19 @@ class Layers:
         _EFFECTS[layer.effect](run, target, layer.value)
 
     def take(self, run: Run, event: int) -> None:
-        """Undo what an event does."""
+        """Remove the effects of an event."""
         for (target, _), layers in self._at.items():
             if layers[-1].event == event:
                 _EFFECTS[layers[-2].effect](run, target, layers[-2].value)
             layers[:] = [layer for layer in layers if layer.event != event]
 
     def release(self, run: Run, target: PortName) -> None:
-        """Take away all that alters a signal."""
+        """Remove all changes of a signal."""
         if self._at.pop((target, False), None):
             run.overrides.release(target)
 
     def tuned(self, component: str) -> dict[str, Value]:
-        """Values that events have given to parameters of a component."""
+        """Return the values that events have given to parameters of a component."""
         return {
             target.port: layers[-1].value
             for (target, _), layers in self._at.items()
@@ -132,13 +132,13 @@ class Layers:
         }
 
     def state(self) -> list[Any]:
-        """What there is, as JSON has it."""
+        """Return the layers as JSON."""
         return [
             (*vars(target).values(), sets, layers) for (target, sets), layers in self._at.items()
         ]
 
     def restore(self, state: Sequence[Any]) -> None:
-        """Restore the saved state; events in progress continue."""
+        """Restore saved layers; events in progress continue."""
         self._at = {
             (PortName(component, port), sets): [Layer(*layer) for layer in layers]
             for component, port, sets, layers in state
@@ -146,7 +146,7 @@ class Layers:
 
 
 def _ground(run: Run, target: PortName, effect: str) -> Layer:
-    """What there is where no event acts."""
+    """Return the value without events."""
     if effect == "tune":
         return Layer(
             _GROUND, effect, run.instances[target.component].read([target.port])[target.port]
@@ -157,15 +157,15 @@ def _ground(run: Run, target: PortName, effect: str) -> Layer:
 
 
 class Action(Protocol):
-    """What an event does."""
+    """The action of an event."""
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
-        """Do it.
+        """Act on a run.
 
         Args:
             run: to act on.
-            event: its number.
-            layers: take what can end.
+            event: number of the event.
+            layers: take effects that can end.
 
         """
 
@@ -176,7 +176,7 @@ class Alter:
 
     Attributes:
         effect: `override` or `bias`.
-        values: for each input.
+        values: by input.
 
     """
 
@@ -184,19 +184,19 @@ class Alter:
     values: tuple[tuple[PortName, Value], ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
-        """Do it."""
+        """Act on a run."""
         for target, value in self.values:
             layers.put(run, target, Layer(event, self.effect, value))
 
 
 @dataclass(frozen=True)
 class Freeze:
-    """Let inputs keep what they have."""
+    """Keep the present values of inputs."""
 
     targets: tuple[PortName, ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
-        """Do it."""
+        """Act on a run."""
         for target in self.targets:
             value = float(run.row.values[run.row.columns[target]])
             layers.put(run, target, Layer(event, "override", value))
@@ -204,25 +204,25 @@ class Freeze:
 
 @dataclass(frozen=True)
 class Release:
-    """Let inputs take what feeds them, whatever events have done to them."""
+    """Undo all effects of events on inputs."""
 
     targets: tuple[PortName, ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
-        """Do it."""
+        """Act on a run."""
         for target in self.targets:
             layers.release(run, target)
 
 
 @dataclass(frozen=True)
 class Set:
-    """Give values to tunable parameters, and to inputs that nothing feeds."""
+    """Set tunable parameters and unconnected inputs."""
 
     parameters: tuple[tuple[PortName, Value], ...]
     inputs: tuple[tuple[PortName, Value], ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
-        """Do it."""
+        """Act on a run."""
         for target, value in self.parameters:
             layers.put(run, target, Layer(event, "tune", value))
         for target, value in self.inputs:
@@ -231,12 +231,12 @@ class Set:
 
 @dataclass(frozen=True)
 class Reset:
-    """Start components over, with their current parameters."""
+    """Restart components with their current parameters."""
 
     components: tuple[str, ...]
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
-        """Do it."""
+        """Act on a run."""
         for name in self.components:
             instance = run.instances[name]
             values = {**run.system.parameters_of(name), **layers.tuned(name)}
@@ -250,27 +250,28 @@ class Reset:
 
 @dataclass(frozen=True)
 class Stop:
-    """End the run, which has not failed."""
+    """End the run without a failure."""
 
     why: str
 
     def act(self, run: Run, event: int, layers: Layers) -> None:
-        """Do it."""
+        """Act on a run."""
         raise Ended(self.why)
 
 
 @dataclass(frozen=True)
 class Event:
-    """Something that happens.
+    """An event of a run.
 
     Attributes:
-        text: what, in words.
-        action: that it is.
-        label: its name in figures.
-        at: when [s]; None: at a condition.
-        when: the condition; it must have been false before.
-        repeat: whether it happens each time that the condition becomes true, or only the first.
-        lasts: for how long [s]; None: for good.
+        text: description.
+        action: of the event.
+        label: name in figures.
+        at: time [s]; None: it has a condition.
+        when: condition, which must have been false before.
+        repeat: if set, the event happens each time that the condition becomes true, else only the
+            first time.
+        lasts: duration [s]; None: to the end of the run.
 
     """
 
@@ -283,20 +284,20 @@ class Event:
     lasts: float | None = None
 
     def __str__(self) -> str:
-        """With its time or condition."""
+        """Format with the time or the condition."""
         when = f"at {self.at:g} s" if self.at is not None else f"when {self.when}"
         return f"{self.text}, {when}"
 
 
 def occurrence(event: Event, number: int, time: float, n: int, *, ends: bool) -> Occurrence:
-    """An event that begins or ends.
+    """Describe the begin or the end of an event.
 
     Args:
-        event: that does.
-        number: of it.
-        time: of now [s].
-        n: how often it has begun or ended until now; at most :data:`MOST_LISTED`.
-        ends: whether it ends.
+        event: that begins or ends.
+        number: of the event.
+        time: present time [s].
+        n: number of its begins and ends until now; at most :data:`MOST_LISTED`.
+        ends: True if it ends.
 
     """
     text = f"{event.text}, ended" if ends else event.text
@@ -307,13 +308,13 @@ def occurrence(event: Event, number: int, time: float, n: int, *, ends: bool) ->
 
 @dataclass
 class _Progress:
-    """How far an event has come.
+    """The progress of an event.
 
     Attributes:
-        happened: whether it has.
-        was_true: whether its condition was when it was last looked at.
-        end: after how many steps it ends.
-        listed: how often something about it was.
+        happened: True once it has happened.
+        was_true: value of its condition at the last test.
+        end: number of steps after which it ends.
+        listed: number of its entries in the list.
 
     """
 
@@ -324,17 +325,17 @@ class _Progress:
 
 
 class Events:
-    """A hook that has events happen."""
+    """A hook that makes events happen."""
 
     def __init__(self, events: Sequence[Event]) -> None:
-        """Take events, in the order in which they act at the same time."""
+        """Take events; events of the same time act in this order."""
         self._events = events
         self._progress = [_Progress() for _ in events]
         self._layers = Layers()
         self._happened: list[Occurrence] = []
 
     def act(self, run: Run) -> int:
-        """End what ends now, then begin what begins now."""
+        """End events that are over, then begin those that are due."""
         run.happened = self._happened
         if run.made >= run.experiment.rows - 1:
             # No step follows.
@@ -348,12 +349,12 @@ class Events:
         return min((self._next(run, number) for number in range(len(self._events))), default=NEVER)
 
     def state(self) -> Any:
-        """How far they have come, as JSON has it."""
+        """Return the progress as JSON."""
         progress = [tuple(vars(progress_of).values()) for progress_of in self._progress]
         return progress, self._layers.state(), self._happened
 
     def restore(self, state: Any) -> None:
-        """Be as far again."""
+        """Restore the progress."""
         progress, layers, happened = state
         self._progress = [_Progress(*progress_of) for progress_of in progress]
         self._layers.restore(layers)
@@ -394,11 +395,11 @@ class Events:
             self._happened.append(occurrence(event, number, run.time, n, ends=ends))
 
     def _next(self, run: Run, number: int) -> int:
-        """After how many steps an event needs action."""
+        """Return the number of steps after which an event needs action."""
         begin = _due(run, self._events[number]) if self._waits(number) else NEVER
         return min(begin, self._progress[number].end)
 
 
 def _due(run: Run, event: Event) -> int:
-    """After how many steps to look at an event."""
+    """Return the number of steps after which to test an event."""
     return run.made + 1 if event.at is None else run.experiment.reaching(event.at)

@@ -1,4 +1,4 @@
-"""Start, stop and steps of a run, t_k = k h; orders and couplings."""
+"""Times, steps, order and coupling of a run; communication points are t_k = k h."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from typing import ClassVar, Literal, TypeAlias, cast, get_args
 
 from orchestrator.machine.errors import InputError
 
-#: Orders in which values pass and components are stepped; the first is the default where the FMUs
+#: Orders in which values pass and components are stepped. The default is the first where the FMUs
 #: allow it, else the second.
 OrderName: TypeAlias = Literal["feedthrough", "gauss-seidel", "jacobi"]
 
-#: One of these, or the names of all components, one stepped after the other.
+#: An order by name, or the names of all components, stepped one after the other.
 Order: TypeAlias = OrderName | list[str] | tuple[str, ...]
 
-#: A rest of a run that is shorter than this share of a step is a rounding error.
+#: A rest of a run shorter than this share of a step is a rounding error.
 _MOST_OF_A_STEP = 1e-3
 
-#: More steps than this are taken for a mistake.
+#: More steps than this are refused as a mistake.
 MOST_STEPS = 1_000_000_000
 
 
@@ -31,17 +31,17 @@ class Exchange:
 
     Attributes:
         initial: one of `INITIAL`.
-        groups: all components, those of a group stepped side by side; each group takes all outputs
-            of the groups before it as they have just computed them, not only what follows directly
-            from their inputs, and rings are delayed. Empty: as the experiment has it.
+        groups: all components, in groups that are stepped side by side. Each group takes all
+            outputs that the groups before it have just computed, not only those with direct
+            feedthrough, and rings are delayed. Empty: the experiment's order.
 
     """
 
     initial: str = "full"
     groups: Sequence[Sequence[str]] = ()
 
-    #: Inputs of components in the first step: outputs that were exchanged in initialisation mode
-    #: (ours), outputs that were exchanged after it, or start values and zeros.
+    #: Inputs of components in the first step: outputs exchanged in initialisation mode (ours),
+    #: outputs exchanged after it, or start values and zeros.
     INITIAL: ClassVar[tuple[str, ...]] = ("full", "none", "zero")
 
 
@@ -53,7 +53,7 @@ OURS = Exchange()
 
 @dataclass(frozen=True)
 class Experiment:
-    """What to run a system for.
+    """Times, step, order and coupling of a run.
 
     Attributes:
         stop_time: end [s]; the last step is shorter if the run is not a multiple of the step.
@@ -61,9 +61,9 @@ class Experiment:
         order: one of `ORDERS`, or the names of all components, one stepped after the other;
             None: `feedthrough` where the outputs of the FMUs follow their inputs between steps,
             else `gauss-seidel`.
-        start_time: begin [s].
-        coupling: one of `COUPLINGS`; None: rings are solved where their FMUs allow it, and
-            else delayed.
+        start_time: start [s].
+        coupling: one of `COUPLINGS`; None: rings are solved where their FMUs allow it, else
+            delayed.
 
     """
 
@@ -77,33 +77,33 @@ class Experiment:
     #: solve them with inputs that change linearly from one communication point to the next.
     Coupling = Literal["solve", "delay", "linear"]
 
-    #: Names that an order and a coupling may have.
+    #: Names of orders and couplings.
     ORDERS: ClassVar[tuple[OrderName, ...]] = get_args(OrderName)
     COUPLINGS: ClassVar[tuple[Coupling, ...]] = get_args(Coupling)
 
-    #: A difference of times that is smaller than this share of them is a rounding error.
+    #: A smaller relative difference of two times is a rounding error.
     ROUNDING: ClassVar[float] = 1e-9
 
     @staticmethod
     def read_order(text: str) -> Order:
-        """Read an order as a command line has it: one of `ORDERS`, or names with commas."""
+        """Read an order of a command line: one of `ORDERS`, or names with commas."""
         if "," in text:
             return tuple(name.strip() for name in text.split(","))
-        # Any other name is refused by the experiment.
+        # The experiment refuses any other name.
         return cast(OrderName, text)
 
     @staticmethod
     def format_order(order: Order | None) -> str:
-        """Write an order as a command line has it; empty: none is stated."""
+        """Write an order for a command line; empty: no order is stated."""
         return order if isinstance(order, str) else ",".join(order or ())
 
     def __post_init__(self) -> None:
-        """Refuse what cannot be run."""
+        """Refuse times, steps, orders and couplings that cannot be run."""
         for name in ("start_time", "stop_time", "step"):
             value = getattr(self, name)
             if not isinstance(value, Real) or isinstance(value, bool):
                 raise InputError(f"times and step must be numbers, not {value!r}")
-            # numpy's numbers do not go into JSON.
+            # JSON has no numbers of numpy.
             try:
                 object.__setattr__(self, name, float(value))
             except OverflowError:
@@ -124,10 +124,10 @@ class Experiment:
             )
 
     def check_step(self, step: float) -> None:
-        """Check that it can be run in steps of a length [s].
+        """Check that the run can be made in steps of a length [s].
 
         Raises:
-            InputError: it cannot be.
+            InputError: it cannot.
 
         """
         if not (isfinite(step) and step > 0.0):
@@ -142,61 +142,61 @@ class Experiment:
 
     @property
     def _length(self) -> float:
-        """How long it lasts [s]."""
+        """Duration [s]."""
         return self.stop_time - self.start_time
 
     @property
     def acting_row(self) -> int:
-        """In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end.
+        """Row that shows what acts in a step: that of its beginning (0), or of its end (1).
 
-        It is all inputs, and the outputs that follow from inputs of the same time. In feedthrough
+        All inputs act, and the outputs that follow from inputs of the same time. In feedthrough
         order they pass before the row shows them; in other orders the step computes them.
         """
         return 0 if self.order in (None, FEEDTHROUGH) else 1
 
     @property
     def full_steps(self) -> int:
-        """How many steps have the whole length."""
+        """Number of steps of full length."""
         return floor(self._in_steps)
 
     @property
     def has_short_step(self) -> bool:
-        """Whether a shorter step follows them."""
+        """True if a shorter step follows them."""
         return self._in_steps > self.full_steps
 
     @property
     def _in_steps(self) -> float:
-        """The run in steps; a whole number where it is one apart from rounding."""
+        """Duration in steps; a whole number where only rounding makes the difference."""
         return _in_steps(self._length, self.step)
 
     def reaching(self, time: float) -> int:
-        """After how many steps a time [s] has come: the first t_k that is not before it."""
-        # Their number may be more than an integer can hold.
+        """Return the number of steps to the first t_k at or after a time [s]."""
+        # The number may exceed what an integer can hold.
         steps = min(max((time - self.start_time) / self.step, 0.0), MOST_STEPS + 1.0)
         return ceil(_rounded(steps))
 
     @property
     def rows(self) -> int:
-        """How many rows a complete run has: one at the start, and one a step."""
+        """Number of rows of a complete run: one at the start, and one a step."""
         return 1 + self.full_steps + self.has_short_step
 
     def time(self, k: int) -> float:
-        """The time after k steps [s]."""
+        """Return the time after k steps [s]."""
         return self.start_time + k * self.step if k <= self.full_steps else self.stop_time
 
     def length(self, k: int, n: int) -> float:
-        """How long n steps after the k-th last [s], or as many of them as are left."""
+        """Return the length of the n steps after the k-th, or of as many as are left [s]."""
         if k + n > self.full_steps and self.has_short_step:
             return self.stop_time - self.time(k)
         return (min(k + n, self.full_steps) - k) * self.step
 
     def steps(self, made: int = 0) -> Iterator[tuple[int, float, float, float]]:
-        """Number, beginning, length and end of every step [s].
+        """Yield number, beginning, length and end of every step [s].
 
-        It ends at t_k = t_0 + k h, which is never accumulated.
+        The end is t_k = t_0 + k h, which is never accumulated.
 
         Args:
-            made: how many steps have been made.
+            made: number of steps that have been made already.
 
         """
         start, step, t = self.start_time, self.step, self.time(made)
@@ -208,19 +208,19 @@ class Experiment:
             yield self.rows - 1, t, self.stop_time - t, self.stop_time
 
 
-#: The names, one by one.
+#: The names one by one.
 FEEDTHROUGH, GAUSS_SEIDEL, JACOBI = Experiment.ORDERS
 SOLVE, DELAY, LINEAR = Experiment.COUPLINGS
 
 
-# Studies ask again and again.
+# Studies ask repeatedly.
 @lru_cache
 def _in_steps(length: float, step: float) -> float:
-    # However small its share of a step, a run is not empty.
+    # A run is not empty, however small its share of a step.
     return _rounded(max(length / step, ulp(0.0)))
 
 
 def _rounded(n: float) -> float:
-    """A number of steps; a whole number where it is one apart from rounding."""
+    """Return a number of steps; a whole number where only rounding makes the difference."""
     nearest = round(n)
     return nearest if abs(n - nearest) <= min(Experiment.ROUNDING * nearest, _MOST_OF_A_STEP) else n

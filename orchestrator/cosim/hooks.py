@@ -1,4 +1,4 @@
-"""Hooks act on a run between two of its steps: inputs that follow a table, and a clock."""
+"""Hooks, which act on a run between two of its steps: inputs that follow a table, and a clock."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
-# By name: an FMU in Python may change what the module holds.
+# Imported by name: an FMU in Python may change the module.
 from numpy import isfinite as are_finite
 
 from orchestrator.cosim.connection import PortName
@@ -29,28 +29,28 @@ from orchestrator.cosim.variables import Value
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.interrupts import Interrupts
 
-#: After more steps than any run has.
+#: A number of steps that no run reaches.
 NEVER = MOST_STEPS + 1
 
 
 @dataclass
 class Run:
-    """A run, as far as it has come.
+    """A run and its progress.
 
     Attributes:
         system, experiment: of the run.
-        instances: of its components, by their names.
+        instances: of its components, by name.
         row: of all values.
         stages: of every step.
-        passing: in which values of t_k pass before the row shows them, and the step; None: the row
-            is shown after the step.
-        overrides: what is done to values on their way from outputs to inputs.
+        passing: stages in which values of t_k pass before the row shows them, and before the step;
+            None: the row is shown after the step.
+        overrides: changes to values on their way from outputs to inputs.
         blocks: take the rows.
-        log: of what the FMUs say.
-        interrupts: signals to stop that have come; a hook that waits looks there.
-        hooks: what acts on it.
-        made: how many steps have been made.
-        due: after how many a hook acts on it: every loop stops there.
+        log: messages of the FMUs.
+        interrupts: signals that have arrived; a hook that waits looks there.
+        hooks: that act on the run.
+        made: number of steps that have been made.
+        due: number of steps after which a hook acts; every loop stops there.
         happened: events, in their order.
 
     """
@@ -72,11 +72,11 @@ class Run:
 
     @property
     def time(self) -> float:
-        """What the components have come to [s]."""
+        """Time that the components have reached [s]."""
         return self.experiment.time(self.made)
 
     def pass_on(self) -> None:
-        """Let values of now pass, where a row shows them before the step."""
+        """Let values of the present time pass, where a row shows them before the step."""
         experiment, k = self.experiment, self.made
         make_stages(
             self.passing or (), self.row.values, experiment, experiment.rows - 1,
@@ -85,14 +85,14 @@ class Run:
 
     @contextmanager
     def ahead(self) -> Iterator[None]:
-        """Have the row as it is shown if nothing more happens now, and then as it was."""
+        """Enter a context with the row as it will be shown, and restore it afterwards."""
         before = self.row.values.copy()
         self.pass_on()
         yield
         self.row.values[:] = before
 
     def refresh(self, component: str) -> None:
-        """Let the inputs of a component take at once what feeds them now."""
+        """Update the inputs of a component from their present sources."""
         targets = [self.row.columns[wire.target] for wire in self.system.feeding[component]]
         with self.ahead():
             self.overrides.refresh(component)
@@ -100,7 +100,7 @@ class Run:
         self.row.values[targets] = taken
 
     def show(self) -> None:
-        """Complete the row of now, which no step follows, and keep it if it is finite."""
+        """Complete the last row, which no step follows, and keep it if it is finite."""
         if self.blocks.count == self.made:
             self.pass_on()
             if are_finite(self.row.shown).all():
@@ -113,44 +113,43 @@ class Hook(Protocol):
     def act(self, run: Run) -> int:
         """Act after :attr:`Run.made` steps, for the first time before any.
 
-        Where a run is resumed, the first call comes after the steps that were made before, whether
-        it was wanted there or not.
+        In a resumed run the first call comes after the steps that were made before, in any case.
 
         Returns:
-            After how many steps it wants to be called again; :data:`NEVER`: not any more.
+            The number of steps after which to call it again; :data:`NEVER`: not again.
 
         Raises:
             Ended: the run is to end here.
-            ComponentFailed: a component failed to do what it was asked to.
+            ComponentFailed: a component has failed.
 
         """
 
 
 @runtime_checkable
 class Lasting(Protocol):
-    """What a run that is resumed has to know again of an earlier process.
+    """Keeps a state that a resumed run needs.
 
-    Such a hook itself remembers what it has done and has still to do.
+    Such a hook remembers what it has done and still has to do.
     """
 
     def state(self) -> Any:
-        """What there is to know, as JSON has it."""
+        """Return the state as JSON."""
 
     def restore(self, state: Any) -> None:
-        """Know it again."""
+        """Restore the state."""
 
 
 class Hooks:
-    """Calls hooks when their time has come."""
+    """Calls hooks when they are due."""
 
     def __init__(self, run: Run) -> None:
-        """Call all hooks of a run first before any step, in their order."""
+        """Call all hooks of a run before the first step, in their order."""
         self._run = run
-        # By their places: two hooks may be equal, and one need not be hashable.
+        # Found by place: two hooks may be equal, or not hashable.
         self._due = [0] * len(run.hooks)
 
     def act(self) -> None:
-        """Call those whose time has come, and let the run go on until the next one's."""
+        """Call the hooks that are due, and continue the run until the next one."""
         run, due = self._run, self._due
         for i, hook in enumerate(run.hooks):
             if due[i] <= run.made:
@@ -158,17 +157,17 @@ class Hooks:
         run.due = min(due, default=NEVER)
 
 
-#: The clock is looked at after as many steps as take so long by it [s].
+#: Time on the clock between two looks at it, in steps [s].
 _GRAIN = 1e-3
 
-#: How often a wait checks whether the run is to stop, or rows are due [s].
+#: Interval at which a wait checks for interrupts and for rows to hand over [s].
 _GLANCE = 0.02
 
-#: Latenesses are counted in classes that are so much longer one than the other, from the first on
-#: [s]: a percentile is known to that share.
+#: Relative width of the classes in which latenesses are counted, and the end of the first class
+#: [s]: a percentile has that precision.
 _RESOLUTION, _FIRST = 0.01, 1e-7
 
-#: The share of the latenesses that is said to be below a percentile.
+#: Share of the latenesses below the recorded percentile.
 _SHARE = 0.99
 
 
@@ -178,12 +177,11 @@ class InputTable:
 
     Attributes:
         targets: inputs that nothing feeds.
-        times: that grow [s].
+        times: increasing [s].
         values: of each input at each time, (times, targets).
-        linear: which inputs go from one value to the next in a straight line; the others hold a
-            value until the next.
-        exact: columns of texts and of integers of 64 bits, by their places; `values` has zeros
-            there.
+        linear: True for inputs that are interpolated linearly; the others keep a value until the
+            next.
+        exact: columns of texts and of integers of 64 bits, by place; `values` has zeros there.
 
     """
 
@@ -201,7 +199,7 @@ class InputTable:
         columns: Sequence[np.ndarray],
         linear: Sequence[bool],
     ) -> InputTable:
-        """A table of columns, each in its type."""
+        """Make a table of columns, each in its type."""
         exact = {place: one for place, one in enumerate(columns) if one.dtype.kind != "f"}
         nothing = np.zeros(len(times))
         values = [nothing if place in exact else one for place, one in enumerate(columns)]
@@ -209,13 +207,13 @@ class InputTable:
 
     @property
     def digest(self) -> str:
-        """Another one for other values."""
+        """Digest that differs for other values."""
         names = " ".join(map(str, self.targets)).encode()
         arrays = (self.times, self.values, self.linear, *self.exact.values())
         return sha256(names + b"".join(array.tobytes() for array in arrays)).hexdigest()
 
     def at(self, time: float, row: int) -> list[Value]:
-        """The values at a time [s], of which a row is the last that is not after it."""
+        """Return the values at a time [s]; `row` is the last row at or before it."""
         row = max(row, 0)
         here, following = self.values[row], self.values[min(row + 1, len(self.values) - 1)]
         length = self.times[min(row + 1, len(self.times) - 1)] - self.times[row]
@@ -235,24 +233,25 @@ class InputTable:
 
     @cached_property
     def _is_steep(self) -> bool:
-        """Whether two values that follow each other lie farther apart than any number is large."""
+        """True if the difference of two successive values is too large for a double."""
         with np.errstate(over="ignore"):
             return not np.isfinite(np.diff(self.values, axis=0)).all()
 
 
 class Playback:
-    """A hook that supplies inputs with what they have at the beginning of each step.
+    """A hook that supplies inputs with the values of a table at the beginning of each step.
 
-    Before the first time of the table they have its first values, after the last its last.
+    Before the first time of the table inputs have the first values, after the last time the last
+    ones.
     """
 
     def __init__(self, input_table: InputTable) -> None:
-        """Take the table that is followed."""
+        """Take the table."""
         self._input_table = input_table
         self._steps = np.empty(0, dtype=int)
 
     def act(self, run: Run) -> int:
-        """Supply the values of now."""
+        """Supply the present values."""
         input_table = self._input_table
         if not len(self._steps):
             self._steps = np.array([run.experiment.reaching(time) for time in input_table.times])
@@ -265,15 +264,15 @@ class Playback:
 
 
 class Lateness:
-    """How late something was, again and again, without a list of it."""
+    """Statistics of how late steps are, without a list."""
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Start empty."""
         self._n, self._sum, self._worst = 0, 0.0, 0.0
         self._counts: Counter[int] = Counter()
 
     def take(self, seconds: float) -> None:
-        """Take one into account [s]."""
+        """Count a lateness [s]."""
         self._n += 1
         self._sum += seconds
         self._worst = max(self._worst, seconds)
@@ -281,12 +280,12 @@ class Lateness:
 
     @property
     def mean(self) -> float:
-        """Of all of them [s]; zero if there was none."""
+        """Mean [s]; zero if there is none."""
         return self._sum / max(self._n, 1)
 
     @property
     def percentile(self) -> float:
-        """What 99 % of them do not exceed [s], at most a hundredth too long."""
+        """Value that 99 % of the latenesses do not exceed [s], at most a hundredth too large."""
         left = _SHARE * self._n
         for place, n in sorted(self._counts.items()):
             left -= n
@@ -296,44 +295,43 @@ class Lateness:
 
     @property
     def worst(self) -> float:
-        """The longest of them [s]."""
+        """Maximum [s]."""
         return self._worst
 
 
 class RealTime:
-    """A hook that makes a run wait for a clock, and measures by how much it is late.
+    """A hook that makes a run wait for a clock, and measures how late it is.
 
-    A run that is late makes up for it as fast as it can: times are one clock's, from the
-    first step on.
+    A late run catches up as fast as it can: the clock runs from the first step on.
 
     Attributes:
-        factor: simulated seconds in a second.
-        lateness: of the steps whose time the clock was asked for.
+        factor: simulated seconds per second.
+        lateness: of the steps after which the clock was read.
 
     """
 
     @staticmethod
     def check(factor: float) -> None:
-        """Check before a run that a clock can set its pace.
+        """Check a factor before a run.
 
         Raises:
-            InputError: it cannot.
+            InputError: it is not positive and finite.
 
         """
         if not (isfinite(factor) and factor > 0.0):
             raise InputError(f"real time x {factor:g}: the factor must be positive and finite")
 
     def __init__(self, factor: float) -> None:
-        """Run as many simulated seconds in a second."""
+        """Limit the speed to simulated seconds per second."""
         self.factor = factor
         self.lateness = Lateness()
         self._origin: float | None = None
 
     def act(self, run: Run) -> int:
-        """Wait until the clock has come to the time of the run."""
+        """Wait until the clock has reached the time of the run."""
         now = monotonic()
         if self._origin is None:
-            # A run that is resumed begins somewhere.
+            # A resumed run does not begin at the start.
             self._origin = now - run.time / self.factor
         else:
             self._wait(run, self._origin + run.time / self.factor)
@@ -352,7 +350,7 @@ class RealTime:
         self.lateness.take(monotonic() - due)
 
     def record(self) -> dict[str, float]:
-        """How well it went, for the record of the run [s]."""
+        """Return the statistics for the record of the run [s]."""
         late = self.lateness
         return {
             "factor": self.factor,
@@ -362,7 +360,7 @@ class RealTime:
         }
 
     def __str__(self) -> str:
-        """How well it went, in words."""
+        """Describe the statistics in one line."""
         late = self.lateness
         mean, percentile, worst = (
             f"{1e3 * seconds:.3g} ms" for seconds in (late.mean, late.percentile, late.worst)

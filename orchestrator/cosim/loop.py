@@ -1,6 +1,6 @@
-"""The loops that make the steps of a run: one after the other in Python, or many in one C call.
+"""The loops that make the steps of a run: one step at a time in Python, or many in one C call.
 
-Both make the same calls of FMI in the same order, and the same rows bit for bit.
+Both make the same FMI calls in the same order, and the same rows, bit for bit.
 """
 
 from __future__ import annotations
@@ -33,27 +33,26 @@ from orchestrator.machine.compilers import (
 )
 from orchestrator.machine.errors import InputError, reason
 
-#: To set the compiled loop up takes as long as so many steps in Python, and to compile it as long
-#: as so many.
+#: Steps in Python that take as long as setting up the compiled loop, and as long as compiling it.
 _SET_UP, _COMPILED = 20, 10_000
 
-#: Above this number of values numpy's library shares products among threads, which takes
-#: milliseconds where the other cores are busy.
+#: Above this number of values numpy's library splits products among threads, which takes
+#: milliseconds where other cores are busy.
 _MOST_MULTIPLIED = 4_096
 
-#: The loop in C.
+#: Source of the compiled loop.
 SOURCE = Path(__file__).with_name("stepper.c")
 
 #: Its category in the cache.
 CATEGORY = "loop"
 
-#: Its function in C.
+#: Its C function.
 _FUNCTION = "advance"
 
-#: Libraries that this process has loaded, by cache folders.
+#: Libraries that this process has loaded, by cache folder.
 _in_use: dict[Path, CDLL] = {}
 
-#: Reasons of the loop in C to return.
+#: Return values of the C function.
 _DUE, _FAILED = range(2)
 
 #: Longest time until Python checks whether the run is to stop [s].
@@ -61,36 +60,36 @@ _GLANCE = 0.02
 
 
 class Steps(Protocol):
-    """Makes the steps of a run, and is an iterator over the moments at which Python may look."""
+    """Makes the steps of a run, as an iterator that yields whenever hooks may act."""
 
     def __call__(self, run: Run) -> Iterator[None]:
-        """Make the steps that are left, and count them; it ends before a row that is not finite.
+        """Make the remaining steps and count them; stop before a row that is not finite.
 
         Yields:
-            Nothing, when Python may look: after as many steps as are due, at the latest.
+            None, whenever hooks may act: at the latest after as many steps as are due.
 
         Raises:
-            ComponentFailed: by the step after them.
+            ComponentFailed: the step after the yielded ones failed.
             Ended: a component ends the run within that step.
 
         """
 
 
 class Stepping(NamedTuple):
-    """A way to make the steps, and its name in records."""
+    """A loop, with its name in records."""
 
     name: str
     steps: Steps
 
 
 def step_interpreted(run: Run) -> Iterator[None]:
-    """Make the steps in Python, and look after each."""
+    """Make the steps in Python, and yield after each."""
     values, shown, append = run.row.values, run.row.shown, run.blocks.append
     experiment, stages, passing = run.experiment, run.stages, run.passing
     steps = experiment.rows - 1
     is_not_finite = _watch(shown)
     for k, t, h, end in experiment.steps(run.made):
-        # Converted once for all of them.
+        # Converted once for all components.
         time, length = c_double(t), c_double(h)
         if passing is not None:
             make_stages(passing, values, experiment, steps, k - 1, time, length)
@@ -107,15 +106,15 @@ def step_interpreted(run: Run) -> Iterator[None]:
 
 
 def _watch(values: np.ndarray) -> Callable[[], object]:
-    """A function that looks whether one of some values is not finite."""
+    """Return a function that tells whether some values are not all finite."""
     if len(values) > _MOST_MULTIPLIED:
         return lambda: not np.isfinite(values).all()
-    # Times zero, what is finite is zero and what is not is nan: the cheapest way to see it.
+    # Zero times a finite number is zero, otherwise nan: the cheapest test.
     return partial(np.vdot, values, np.zeros_like(values))
 
 
 class CMapping(Structure):
-    """Values that become others on their way through one connection."""
+    """Values that a connection maps to others: see stepper.c."""
 
     _fields_ = (
         ("connection", c_size_t),
@@ -126,7 +125,7 @@ class CMapping(Structure):
 
 
 class CStage(Structure):
-    """Inputs to gather, and the components to step then."""
+    """Inputs to gather, and the components to step: see stepper.c."""
 
     _fields_ = (
         ("targets", c_void_p),
@@ -144,7 +143,7 @@ class CStage(Structure):
 
 
 class CRun(Structure):
-    """All that the steps of a run need."""
+    """The steps of a run: see stepper.c."""
 
     _fields_ = (
         ("stages", POINTER(CStage)),
@@ -161,13 +160,13 @@ class CRun(Structure):
 
 
 class CFailure(Structure):
-    """The first call with a status that is worse than a warning."""
+    """The first call with a status worse than a warning: see stepper.c."""
 
     _fields_ = (("stage", c_size_t), ("member", c_size_t), ("call", c_int), ("status", c_int))
 
 
 def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
-    """Make the steps of a run by stepper.c, compiled: see :class:`Steps`."""
+    """Make the steps of a run with the compiled loop: see :class:`Steps`."""
     advance = library.advance
     advance.restype = c_int
     advance.argtypes = (
@@ -236,9 +235,9 @@ def _mapping(place: int, pairs: Mapping[float, float]) -> CMapping:
 
 
 def load_stepper() -> CDLL | None:
-    """Load the library that was compiled earlier; None: there is none."""
+    """Load the library if it was compiled earlier; None: it was not."""
     folder = users_folder()
-    # A library that is loaded is not looked up again: short runs would take longer for it.
+    # A loaded library is not looked up again, which would slow down short runs.
     if folder not in _in_use and (library := find_library(CATEGORY, key_of(), _FUNCTION)):
         _in_use[folder] = library
     return _in_use.get(folder)
@@ -248,10 +247,10 @@ def compile_stepper(in_no_time: bool = False) -> CDLL:
     """Compile the library, unless it was compiled earlier, and load it.
 
     Args:
-        in_no_time: only by a compiler that takes a tenth of a second.
+        in_no_time: if set, use only a compiler that takes a tenth of a second.
 
     Raises:
-        InputError: it cannot be; the text says what to do.
+        InputError: it cannot be compiled; the text says what to do.
 
     """
     compiler = own_compiler() if in_no_time else find_compiler()
@@ -272,7 +271,7 @@ def key_of(machine: str = platform_tuple) -> str:
     return library_key(SOURCE.read_text(encoding="utf-8"), *FLAGS, machine=machine)
 
 
-#: The loop that is always there.
+#: The loop that is always available.
 PYTHON_LOOP = Stepping("python", step_interpreted)
 
 
@@ -283,11 +282,11 @@ def choose_loop(
 
     Args:
         wanted: `auto`, `python` or `compiled`.
-        experiment: to be run.
-        isolation: of the FMUs: none of their calls is then a function of this process.
+        experiment: of the run.
+        isolation: of the FMUs, whose functions are then not in this process.
 
     Raises:
-        InputError: the compiled loop cannot be had.
+        InputError: the compiled loop is not available.
 
     """
     if wanted == "compiled":

@@ -1,7 +1,7 @@
-"""Observers of a run: what they are told, in which blocks of rows, a selection, a progress bar.
+"""Observers of a run: tables in memory, files, selections; and the blocks in which they get rows.
 
 In feedthrough order a row holds all values of its time t_k; in other orders the outputs after the
-step that ended there, and the inputs that this step was made with.
+step that ended then, and the inputs of this step.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
 from orchestrator.machine.operating_system import is_still
 from orchestrator.machine.parquet import ROWS_AT_ONCE, parquet
 
-#: Rows in a block, and the longest time until observers are told of them [s].
+#: Rows in a block, and the longest time for which rows wait [s].
 _ROWS, _PATIENCE = 512, 0.2
 
 
 @dataclass(frozen=True)
 class Header:
-    """What is known of a run when its first row has been computed.
+    """Columns, experiment and parameters of a run, known when its first row has been computed.
 
     Attributes:
         columns: `component.port` of every value in a row, after the time.
-        experiment: that is run.
-        parameters: of all components, as the FMUs reported them after initialisation.
-        loop: which one makes the steps, `python` or `compiled`: the rows are the same.
-        types: FMI types of the columns that do not hold doubles, all of them in `TYPES`.
-        units: of the columns that have one, as the FMUs write them.
-        strings: the texts and large integers that numbers in these columns stand for.
+        experiment: of the run.
+        parameters: of all components, as the FMUs report them after initialisation.
+        loop: that makes the steps, `python` or `compiled`; both make the same rows.
+        types: FMI types of the columns that do not hold doubles, each one of `TYPES`.
+        units: of the columns that have one, as written by the FMUs.
+        strings: texts and large integers that numbers in these columns stand for.
 
     """
 
@@ -61,7 +61,7 @@ class Header:
 
     @cached_property
     def place(self) -> Mapping[str, int]:
-        """Where each column is in a row, time first."""
+        """Index of each column in a row, after the time."""
         return {name: i for i, name in enumerate(self.columns, start=1)}
 
     @cached_property
@@ -92,19 +92,19 @@ class Header:
 
     @property
     def encoders(self) -> dict[str, Callable[[Any], float]]:
-        """Functions that put values, or texts of them, into rows, by the columns that need one."""
+        """Functions that turn values, or their texts, into numbers of a row, by column."""
         return {name: standing.number for name, standing in self.standing.items()}
 
     def every(self, interval: float | None) -> Every | None:
-        """Return what chooses the times of the run for an interval [s]; None: all are kept."""
-        # An interval that is no longer than the step keeps all.
+        """Return an object that chooses times for an interval [s]; None: all are kept."""
+        # An interval not longer than the step keeps all.
         if interval is None or interval <= self.experiment.step:
             return None
         return Every(interval, self.experiment.start_time)
 
     @cached_property
     def standing(self) -> dict[str, Standing]:
-        """What numbers in the rows stand for, by the columns that need it."""
+        """Decoding of the columns that do not hold doubles."""
         return {
             name: Standing(self.types[name], self.strings)
             for name in self.columns
@@ -113,13 +113,13 @@ class Header:
 
 
 class Occurrence(NamedTuple):
-    """Something that has happened during a run.
+    """An event of a run that has happened.
 
     Attributes:
-        time: at which it did [s].
-        text: what happened.
-        label: its name in a figure; empty: it has none, as the end of something.
-        event: its number among those that may happen.
+        time: of the event [s].
+        text: description of the event.
+        label: name in a figure; empty: it has none, as the end of an event.
+        event: number of the event among those of the run.
 
     """
 
@@ -129,21 +129,21 @@ class Occurrence(NamedTuple):
     event: int = 0
 
     def __str__(self) -> str:
-        """In one line."""
+        """Format as one line."""
         label = f" ({self.label})" if self.label and self.label != self.text else ""
         return f"t = {self.time:.12g} s: {self.text}{label}"
 
 
 @dataclass(frozen=True)
 class Ending:
-    """How a run has ended.
+    """The end of a run.
 
     Attributes:
-        failure: why it failed, or None.
-        remark: why it ended early though it has not failed, or None.
-        messages: what the FMUs logged with status warning or worse.
-        interrupts: numbers of the signals to stop that have come meanwhile.
-        events: that have happened, in their order.
+        failure: reason why it failed, or None.
+        remark: reason why it ended early without a failure, or None.
+        messages: of the FMUs, with status warning or worse.
+        interrupts: numbers of the signals that arrived.
+        events: that happened, in their order.
 
     """
 
@@ -154,14 +154,14 @@ class Ending:
     events: tuple[Occurrence, ...] = ()
 
     def require_success(self, name: str) -> None:
-        """Refuse a run that has not come to its end.
+        """Refuse a run that was interrupted or has failed.
 
         Args:
             name: of the system, for the message.
 
         Raises:
             InputError: it has failed.
-            KeyboardInterrupt: a signal has come to stop it.
+            KeyboardInterrupt: a signal stopped it.
 
         """
         if self.interrupts:
@@ -171,34 +171,34 @@ class Ending:
 
 
 class NotKept(Exception):
-    """An observer cannot take rows: the disk is full, or memory is short."""
+    """An observer cannot keep rows: the disk is full, or memory is short."""
 
 
 class Observer(Protocol):
-    """Takes the rows that a run computes."""
+    """Takes the rows of a run."""
 
     def begin(self, header: Header) -> None:
         """Prepare for the rows of a run."""
 
     def take(self, rows: np.ndarray) -> None:
-        """Take some rows, time first, (n, 1 + columns); the array is used again afterwards."""
+        """Take some rows, time first, (n, 1 + columns); the array is reused afterwards."""
 
     def end(self, ending: Ending) -> None:
-        """Take note that there are no more rows."""
+        """Finish: no rows follow."""
 
 
 class CBlock(Structure):
-    """Rows, each with the time in front: where, how many at most, and how many: see stepper.c."""
+    """A block of rows, each with the time in front: address, capacity, length: see stepper.c."""
 
     _fields_ = (("rows", c_void_p), ("most", c_size_t), ("n", c_size_t))
 
 
 class Blocks:
-    """Hands rows to observers, some hundred at a time.
+    """Hands rows to observers in blocks.
 
     Attributes:
-        block: the rows that observers do not know yet, as the compiled loop fills them.
-        due: when they have waited long enough, by the clock `monotonic` [s].
+        block: rows that observers have not got yet, as the compiled loop fills them.
+        due: time on the clock `monotonic` at which rows must be handed over [s].
 
     """
 
@@ -212,10 +212,10 @@ class Blocks:
         """Make room for one block.
 
         Args:
-            width: values in a row, without the time.
-            observers: to be told.
-            ours: a context that they are told in.
-            rounded: places of values that FMUs get as Float32.
+            width: number of values in a row, without the time.
+            observers: take the rows.
+            ours: context in which observers are called.
+            rounded: columns of values that FMUs get as Float32.
 
         """
         self._rows = np.empty((_ROWS, 1 + width))
@@ -228,11 +228,11 @@ class Blocks:
 
     @property
     def count(self) -> int:
-        """How many rows there are by now, told or not."""
+        """Number of rows until now, handed over or not."""
         return self._told + int(self.block.n)
 
     def append(self, t: float, values: np.ndarray) -> None:
-        """Take a row."""
+        """Append a row."""
         n = self.block.n
         if n == _ROWS:
             self.hand_over()
@@ -242,14 +242,14 @@ class Blocks:
         self.block.n = n + 1
 
     def hand_over(self) -> None:
-        """Tell the observers of the rows that they do not know yet.
+        """Give the observers the rows of the block.
 
         Raises:
-            NotKept: one of them failed; the others were told.
+            NotKept: an observer failed; the others got the rows.
 
         """
         if n := self.block.n:
-            # Counted as told before they are told: an observer that fails is not told twice.
+            # Counted before observers get them: an observer that fails gets no row twice.
             self.block.n = 0
             if self._rounded:
                 values = self._values[:n]
@@ -259,10 +259,10 @@ class Blocks:
         self.due = monotonic() + _PATIENCE
 
     def tell(self, rows: np.ndarray) -> None:
-        """Tell the observers of rows that an earlier process has computed.
+        """Give the observers rows that an earlier process has computed.
 
         Raises:
-            NotKept: one of them failed; the others were told.
+            NotKept: an observer failed; the others got the rows.
 
         """
         self.hand_over()
@@ -281,15 +281,15 @@ class Blocks:
 
 
 class Every:
-    """Chooses the first of the times in each interval since the start of a run."""
+    """Chooses the first time in each interval since the start of a run."""
 
     def __init__(self, interval: float, start: float = 0.0) -> None:
         """Take the interval and the start [s]."""
         self._interval, self._start, self._count = interval, start, -1.0
 
     def chosen(self, times: np.ndarray) -> np.ndarray:
-        """Which of some further times are chosen, as truth values."""
-        # A time is rounded to the digits that it has, however short the run.
+        """Return which of some further times are chosen, as Booleans."""
+        # The rounding of a time depends on its size, not on the length of the run.
         elapsed = times - self._start + np.spacing(np.abs(times))
         counts = np.floor(elapsed / self._interval * (1.0 + Experiment.ROUNDING))
         grown: np.ndarray = np.diff(counts, prepend=self._count) > 0.0
@@ -298,11 +298,11 @@ class Every:
 
 
 class Selection:
-    """An observer that hands on a part of the rows and columns to another."""
+    """An observer that passes a part of the rows and columns to another one."""
 
     @staticmethod
     def check(interval: float) -> None:
-        """Check before a run that its interval can be kept.
+        """Check an interval before a run.
 
         Raises:
             InputError: it is not positive.
@@ -320,8 +320,8 @@ class Selection:
         """Select for an observer.
 
         Args:
-            observer: to be told of the selected rows.
-            interval: a row is kept for each of these [s], and the last one; None: all.
+            observer: takes the selected rows.
+            interval: of the rows to keep [s], besides the last one; None: all.
             columns: to keep; None: all.
 
         """
@@ -332,7 +332,7 @@ class Selection:
         self._last = np.empty((0, 0))
 
     def begin(self, header: Header) -> None:
-        """Find out where the columns are."""
+        """Find the columns."""
         kept = header.columns if self._columns is None else tuple(self._columns)
         self._every = header.every(self._interval)
         self._places = [0, *(header.place[name] for name in kept)]
@@ -351,29 +351,29 @@ class Selection:
         self._last = rows[:0] if chosen[-1] else rows[-1:].copy()
 
     def end(self, ending: Ending) -> None:
-        """Hand on the last row, if it has not been."""
+        """Pass on the last row, if it was not kept."""
         if len(self._last):
             self._observer.take(self._last)
         self._observer.end(ending)
 
 
-#: More rows than this are not kept in memory.
+#: Largest number of rows in memory.
 MOST_ROWS = 10_000_000
 
-#: Rows further apart than the step, by more than this share of it, do not follow each other.
+#: Rows whose distance exceeds the step by more than this share do not follow each other.
 _ROUNDING = 1e-6
 
 
 class Table:
     """An observer that keeps the rows of a run, one at the start and one a step.
 
-    What acts in a step stands in the row of its beginning or in that of its end, as
-    :attr:`.Experiment.acting_row` says. :meth:`step_values`, :meth:`start_values` and
-    :attr:`step_start` pair it with what the other columns hold when it begins.
+    Values that act in a step stand in the row of its beginning or in the row of its end, see
+    :attr:`.Experiment.acting_row`. :meth:`step_values`, :meth:`start_values` and :attr:`step_start`
+    pair them with the other columns at the beginning of the step.
 
     Attributes:
         header: of the run: columns, experiment, parameters.
-        ending: how the run has ended.
+        ending: of the run.
 
     """
 
@@ -386,13 +386,13 @@ class Table:
 
     @classmethod
     def of(cls, header: Header, rows: np.ndarray, ending: Ending | None = None) -> Table:
-        """A table of rows that are there already, time first."""
+        """Make a table of existing rows, time first."""
         table = cls()
         table.hold(header, rows, ending)
         return table
 
     def hold(self, header: Header, rows: np.ndarray, ending: Ending | None = None) -> None:
-        """Take rows that are there already, time first."""
+        """Take existing rows, time first."""
         self._enter(header, rows)
         self._n = len(rows)
         self.ending = ending or self.ending
@@ -405,7 +405,7 @@ class Table:
         n = header.experiment.rows
         if n > MOST_ROWS:
             raise InputError(f"{n:,} rows do not fit into memory; take larger steps")
-        # Memory is taken when a row is written, so a long run costs what it has computed.
+        # Memory is used when a row is written, so that a long run costs only what it has computed.
         try:
             self._enter(header, np.empty((n, 1 + len(header.columns))))
         except MemoryError as error:
@@ -417,19 +417,19 @@ class Table:
         self._n += len(rows)
 
     def end(self, ending: Ending) -> None:
-        """Remember how the run has ended."""
+        """Keep the ending."""
         self.ending = ending
 
     def __len__(self) -> int:
-        """How many rows were computed."""
+        """Return the number of rows."""
         return self._n
 
     def __contains__(self, column: str) -> bool:
-        """Whether there is a column `component.port`."""
+        """Return True for a column `component.port`."""
         return column == "time" or column in self.header.place
 
     def __getitem__(self, column: str) -> np.ndarray:
-        """The values of one column: texts of a String, integers of 64 bits, else doubles.
+        """Return a column: texts of a String, integers of 64 bits, else doubles.
 
         Raises:
             KeyError: there is no such column; the text has a suggestion.
@@ -458,20 +458,20 @@ class Table:
 
     @property
     def parameters(self) -> Mapping[PortName, Any]:
-        """Of all components, as the FMUs reported them after initialisation."""
+        """Parameters of all components, as the FMUs report them after initialisation."""
         return self.header.parameters
 
     @property
     def failure(self) -> str | None:
-        """Why the run ended early, or None."""
+        """Reason why the run failed, or None."""
         return self.ending.failure
 
     def group(self, *columns: str) -> np.ndarray:
-        """Several columns side by side, (rows, columns)."""
+        """Return several columns side by side, (rows, columns)."""
         return np.column_stack([self[column] for column in columns])
 
     def missing(self, columns: Iterable[str], parameters: Iterable[str] = ()) -> list[str]:
-        """The columns and parameters, `component.name`, that are wanted and not there."""
+        """Return the columns and parameters, `component.name`, that the table lacks."""
         known = self.header.parameter_names
         return [column for column in columns if column not in self] + [
             name for name in parameters if name not in known
@@ -479,9 +479,9 @@ class Table:
 
     @cached_property
     def _before(self) -> np.ndarray:
-        """For every step of :meth:`step_values`, the row of the time at which it began.
+        """For every step of :meth:`step_values`, the row of its beginning.
 
-        Where rows were left out and what acts stands in that of its end, it is that row.
+        Where rows were left out and values act in the row of the end, that row.
         """
         ends = np.arange(1, self._n)
         follows = np.diff(self.time) <= self.header.experiment.step * (1.0 + _ROUNDING)
@@ -497,39 +497,39 @@ class Table:
 
     @property
     def acting(self) -> slice:
-        """The rows in which what acts in steps stands: all but one."""
+        """Rows in which the values that act in steps stand: all but one."""
         first = self.header.experiment.acting_row
         return slice(first, self._n - 1 + first)
 
     def step_values(self, *columns: str) -> np.ndarray:
-        """What acts in steps, or follows from inputs of their beginning: of each row but one."""
+        """Return values that act in steps, or follow from inputs of their beginning: a row a step."""
         return self.group(*columns)[self.acting]
 
     def start_values(self, *columns: str) -> np.ndarray:
-        """What these columns held when these steps began."""
+        """Return the columns at the beginning of these steps."""
         values: np.ndarray = self.group(*columns)[self._before]
         return values
 
 
-#: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
-#: are written at once.
+#: Upper limits for Parquet: bytes of a value, and bytes that describe a column of the rows that are
+#: written at once.
 _BYTES, _CHUNK_BYTES = 9, 1024
 
 
 class _Output(RawIOBase):
-    """A new file to write to, which is opened again where an FMU in this process has closed it."""
+    """A new file for output, which is reopened if an FMU in this process has closed it."""
 
     def __init__(self, path: Path) -> None:
-        """Make it."""
+        """Create the file."""
         self._path, self._at = path, 0
         self._descriptor = self._opened(os.O_CREAT | os.O_TRUNC)
         self._status = os.fstat(self._descriptor)
 
     def check_place(self) -> None:
-        """Check that it is still where it was made.
+        """Check that the file is still where it was created.
 
         Raises:
-            OSError: the output would go nowhere.
+            OSError: it was moved or deleted.
 
         """
         try:
@@ -540,19 +540,19 @@ class _Output(RawIOBase):
             raise FileNotFoundError(f"{self._path} was moved or deleted while it was written")
 
     def fileno(self) -> int:
-        """Its descriptor."""
+        """Return the descriptor."""
         return self._descriptor
 
     def writable(self) -> bool:
-        """It is."""
+        """Return True."""
         return True
 
     def tell(self) -> int:
-        """How much was written [bytes]."""
+        """Return the number of bytes written."""
         return self._at
 
     def write(self, content: Any) -> int:
-        """Write some of what there is to write."""
+        """Write some bytes, and return their number."""
         self._reopen()
         os.lseek(self._descriptor, self._at, os.SEEK_SET)
         n = os.write(self._descriptor, content)
@@ -560,21 +560,21 @@ class _Output(RawIOBase):
         return n
 
     def truncate(self, size: int | None = None) -> int:
-        """Cut it off."""
+        """Truncate the file."""
         self._at = self._at if size is None else size
         self._reopen()
         os.ftruncate(self._descriptor, self._at)
         return self._at
 
     def close(self) -> None:
-        """Close it, if that is still to be done."""
+        """Close the file if it is open."""
         if not self.closed:
             super().close()
             if is_still(self._descriptor, self._status):
                 os.close(self._descriptor)
 
     def _reopen(self) -> None:
-        """Open it again if an FMU has closed it, or the owner of a file that an FMU has closed."""
+        """Reopen the file if an FMU has closed it, or owns its descriptor now."""
         if not is_still(self._descriptor, self._status):
             self._descriptor = self._opened()
 
@@ -585,7 +585,7 @@ class _Output(RawIOBase):
 class TableFile(ABC):
     """An observer that writes the rows of a run into a file."""
 
-    #: Formats, which are also the endings of the files.
+    #: Formats, and the endings of their files.
     Format = Literal["csv", "parquet"]
     FORMATS: ClassVar[tuple[Format, ...]] = get_args(Format)
 
@@ -595,10 +595,10 @@ class TableFile(ABC):
 
     @staticmethod
     def at(path: Path) -> TableFile:
-        """Return the observer that writes a file: Parquet by that ending, else CSV.
+        """Return the observer for a file: Parquet for `.parquet`, else CSV.
 
         Raises:
-            InputError: it takes pyarrow, which is not installed.
+            InputError: Parquet needs pyarrow, which is not installed.
 
         """
         return ParquetFile(path) if path.suffix == ".parquet" else CsvFile(path)
@@ -617,7 +617,7 @@ class TableFile(ABC):
 
 
 class CsvFile(TableFile):
-    """An observer that writes CSV, whose file ends with a whole line even where writing fails."""
+    """An observer that writes CSV; the file ends with a whole line even where writing fails."""
 
     def begin(self, header: Header) -> None:
         """Make the file and write the names of its columns."""
@@ -626,10 +626,10 @@ class CsvFile(TableFile):
         self._write([("time", *header.columns)])
 
     def take(self, rows: np.ndarray) -> None:
-        """Write some rows, numbers so that they read back exactly.
+        """Write some rows, with numbers that read back exactly.
 
         Raises:
-            OSError: not all of them could be written; those that could are there.
+            OSError: some rows could not be written; the others are in the file.
 
         """
         lines = rows.tolist()
@@ -647,7 +647,8 @@ class CsvFile(TableFile):
         self._file.check_place()
         text = _in_csv(lines)
         if "\r" in text:
-            # Readers take one outside quotes for the end of a line, and Python puts it in none.
+            # Readers take an unquoted carriage return for the end of a line, and Python does not
+            # quote it.
             text = _in_csv(lines, csv.QUOTE_NONNUMERIC)
         content = text.encode()
         begin, n = self._file.tell(), 0
@@ -668,8 +669,8 @@ def _in_csv(lines: Sequence[Sequence[object]], quoting: Any = csv.QUOTE_MINIMAL)
 class ParquetFile(TableFile):
     """An observer that writes Apache Parquet: doubles, texts, and integers of 64 bits.
 
-    Without what is written last, nothing of such a file can be read: there is always room for that,
-    and for the rows that wait.
+    A file without its last part cannot be read at all: room for that part, and for the rows that
+    wait, is always reserved.
     """
 
     def __init__(self, path: Path) -> None:
@@ -702,7 +703,7 @@ class ParquetFile(TableFile):
         self._take_room()
 
     def take(self, rows: np.ndarray) -> None:
-        """Write some rows, when there are enough of them: always as many at once."""
+        """Write some rows once there are enough for a block of fixed size."""
         self._waiting.append(rows.copy())
         while sum(map(len, self._waiting)) >= ROWS_AT_ONCE:
             waiting = np.vstack(self._waiting)
@@ -728,7 +729,7 @@ class ParquetFile(TableFile):
         self._n += 1
 
     def _take_room(self) -> None:
-        """Take the room that the file needs until the next time, if it can be had.
+        """Reserve the room that the file needs until the next block, if possible.
 
         Raises:
             OSError: there is not enough.

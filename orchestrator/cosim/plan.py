@@ -23,15 +23,16 @@ class Plan:
     """A system that is ready for :func:`.simulation.simulate_plan`: see :func:`make_plan`.
 
     Attributes:
-        system: that is run.
-        experiment: until when, in which steps and which order.
-        decimations: how many communication steps one step of each component takes.
+        system: to run.
+        experiment: times, steps and order.
+        decimations: number of communication steps in one step of each component.
         rings: all rings of direct feedthroughs.
-        arrangement: of its components where all rings are solved; once they are initialised, the
-            one that is taken.
-        remarks: lines for the user of a run.
-        isolation: runs each FMU in a separate process; None: all run in this one.
-        loop: makes the steps, one of `LOOPS`; the rows are the same.
+        arrangement: of the components where all rings are solved; after initialisation, the one
+            that the run takes.
+        remarks: lines for the user.
+        isolation: settings of separate processes, one for each FMU; None: all FMUs run in this
+            process.
+        loop: makes the steps, one of `LOOPS`; all loops make the same rows.
 
     """
 
@@ -52,21 +53,21 @@ class Plan:
         """Return the stages of every step.
 
         Args:
-            latest: if set, stages take all that those before them have computed.
+            latest: if set, stages take all outputs that the stages before them have computed.
 
         """
         return stages_of(self.system, self.arrangement, self.decimations, latest=latest)
 
     def identity(self, events: Sequence[object] = (), inputs: str = "") -> Identity:
-        """Everything that decides the rows of a run.
+        """Return everything that decides the rows of a run.
 
-        Code counts as a whole, comments included: a run is better made once too often than taken
-        for another one. The loop and the processes that make the steps are not in it, since the
-        rows are the same; nor are the places of FMUs and the name of a scenario.
+        Code counts as a whole, comments included: to repeat a run is better than to take it for
+        another one. Loop and processes are not part of it, since the rows are the same; neither are
+        the locations of FMUs and the name of a scenario.
 
         Args:
-            events: that happen to it.
-            inputs: digest of the values of inputs over time; empty: they keep their values.
+            events: of the run.
+            inputs: digest of the values of inputs over time; empty: inputs keep their values.
 
         """
         system = self.system
@@ -74,10 +75,10 @@ class Plan:
             "the code": code_of("orchestrator.cosim"),
             "the version of Python": python_version(),
             **{f"the version of {package}": version(package) for package in PACKAGES},
-            # Their order is the order of the columns, and says where a ring is opened.
+            # Their order is the order of the columns, and decides where a ring is opened.
             "the components": ", ".join(system.components),
             **{f"the FMU of {name}": part.digest for name, part in system.components.items()},
-            # What follows from the units of the two ends is in the transformation.
+            # A conversion of units is part of the transformation.
             **{f"what feeds {wire.target}": repr(wire) for wire in system.connections},
             **{f"the step of {name}": repr(float(step)) for name, step in system.steps.items()},
             **{
@@ -97,19 +98,20 @@ def make_plan(
     isolation: Isolation | None = None,
     loop: str = "python",
 ) -> Plan:
-    """Check what can be checked before an FMU is loaded.
+    """Check a system and its experiment before any FMU is loaded.
 
-    Where an FMU takes steps of one length only, a last, shorter step is left out.
+    Where an FMU takes only steps of one length, a last, shorter step is left out.
 
     Args:
-        system: that is run.
+        system: to run.
         experiment: times, step, order and coupling.
-        isolation: runs each FMU in a separate process; None: all run in this one.
+        isolation: settings of separate processes, one for each FMU; None: all FMUs run in this
+            process.
         loop: makes the steps, one of :attr:`Plan.LOOPS`.
 
     Raises:
-        InputError: the system or its steps are not usable, no step is left, or there is no such
-            loop.
+        InputError: the system or its steps are not usable, no step is left, or the loop is not
+            available.
 
     """
     if loop not in Plan.LOOPS:
@@ -147,8 +149,8 @@ def _check_linear(system: System) -> None:
     """Check that the components of a system can be stepped with linear inputs.
 
     Raises:
-        InputError: one that others feed cannot go back, or its inputs cannot change in a step; or
-            one takes longer steps.
+        InputError: a component with fed inputs cannot go back, or its inputs cannot change in a
+            step; or a component takes longer steps.
 
     """
     for name, component in system.components.items():

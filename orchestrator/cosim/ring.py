@@ -1,8 +1,8 @@
 """Rings of direct feedthroughs: the algebraic loops that FMUs form, solved at one time.
 
-A ring is closed when every input that one of its components feeds has what arrives there. Values
-first go round it once; what then still differs is found by Newton's method on the inputs that are
-Reals, by setting inputs and getting outputs at the same time. No step is made or taken back.
+A ring is closed when each input that its components feed equals the value that arrives there.
+Values first go round it once; Newton's method on the Real inputs removes the remaining difference,
+by setting inputs and getting outputs at the same time. No step is made or taken back.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from orchestrator.cosim.variables import Variable
 from orchestrator.machine.errors import shortened
 from orchestrator.machine.texts import real
 
-#: A ring is at rest where what arrives at each input differs by no more than this, relatively or
-#: absolutely; what brings it nearer is done until it is within rounding.
+#: Tolerance, relative and absolute, within which a ring is at rest; iteration goes on down to
+#: rounding.
 _REST, _ROUNDING = (1e-10, 1e-12), (1e-14, 1e-14)
 
-#: Limits of the rounds of discrete values, of the steps of Newton's method, and of the halvings of
-#: one step.
+#: Limits for the rounds of discrete values, the steps of Newton's method, and the halvings of a
+#: step.
 _MOST_ROUNDS, _MOST_STEPS, _MOST_HALVINGS = 1000, 50, 10
 
 #: A derivative is used again while each step leaves at most this share of the difference.
 _GOOD_STEP = 0.1
 
-#: Share of an input, or of its nominal value, by which it is changed to see what follows; of a
-#: Float32, and the share within which one is at rest.
+#: Relative change of an input, or of its nominal value, for differences; the same for a Float32,
+#: and the relative tolerance of a Float32.
 _CHANGE, _CHANGE_OF_FLOAT32, _GRAIN_OF_FLOAT32 = 1e-7, 1e-3, 2.0**-22
 
-#: More inputs than this are not solved for: their matrix would take more than 128 MB.
+#: Rings with more inputs are not solved: their matrix would take more than 128 MB.
 _MOST_INPUTS = 4000
 
 
@@ -47,11 +47,12 @@ class _Part:
     """One component of a ring.
 
     Attributes:
-        instance, row: of the component, and that it is tied to.
-        gather: what others of the ring, or it itself, feed it.
-        block: of what it feeds and its unknowns in a matrix of the ring's inputs.
-        unknowns, inputs: the Reals that they feed, as columns of the row and as variables.
-        sources, outputs: what it feeds the ring's inputs that are Reals with, likewise.
+        instance: of the component.
+        row: that it is tied to.
+        gather: gathers the inputs that are fed within the ring.
+        block: indices of the component's derivatives in a matrix of the ring's inputs.
+        unknowns, inputs: Reals that the ring feeds, as columns of the row and as variables.
+        sources, outputs: Reals that feed the ring's Real inputs, as columns and as variables.
 
     """
 
@@ -65,12 +66,12 @@ class _Part:
     outputs: list[Variable]
 
     def exchange(self) -> None:
-        """Set its inputs and read its outputs, also those that are shown later in a step."""
+        """Set its inputs and read its outputs, including those that are shown later in a step."""
         self.instance.exchange()
         self.row.show(self.instance.name)
 
     def changes(self) -> np.ndarray:
-        """Derivatives of its outputs with its inputs by differences: (sources, unknowns)."""
+        """Return derivatives of its outputs by its inputs from differences: (sources, unknowns)."""
         values = self.row.values
         found = np.zeros((len(self.sources), len(self.unknowns)))
         here = values[self.sources]
@@ -84,7 +85,7 @@ class _Part:
         return found
 
     def derivatives(self) -> np.ndarray:
-        """Derivatives of its outputs with its inputs, from the FMU or by differences."""
+        """Return derivatives of its outputs by its inputs, from the FMU or from differences."""
         if self.outputs and self.instance.gives_derivatives:
             with suppress(ComponentFailed):
                 outputs = [variable.name for variable in self.outputs]
@@ -99,8 +100,8 @@ class Ring:
     """A ring of components that are stepped as one.
 
     Attributes:
-        names: of its components, in the order in which values go round.
-        outer: gathers what others feed them.
+        names: of the components, in the order in which values go round.
+        outer: gathers the inputs that other components feed.
 
     """
 
@@ -112,7 +113,7 @@ class Ring:
         Args:
             names: of its components.
             system: that it belongs to.
-            instances: of its components.
+            instances: of the components.
             row: that they are tied to.
 
         """
@@ -128,7 +129,7 @@ class Ring:
         self._real = np.array([_is_real(system, c) for c in connections], dtype=bool)
         self._reals = np.ix_(self._real, self._real)
         grain = np.array([_grain(system, connection) for connection in connections])
-        # What is no Real is another value, or it is the same.
+        # A value that is not a Real either equals the other one or differs from it.
         self._rest, self._rounding = (
             (self._real * np.maximum(relative, grain), self._real * absolute)
             for relative, absolute in (_REST, _ROUNDING)
@@ -158,7 +159,7 @@ class Ring:
 
     @property
     def gatherings(self) -> list[Gathering]:
-        """All that its components take."""
+        """Everything that the components of the ring take."""
         return [self.outer, *self._inner]
 
     @property
@@ -166,7 +167,7 @@ class Ring:
         return [part.gather for part in self._parts]
 
     def unsolved(self) -> dict[str, str]:
-        """Its components that cannot be solved for between steps, and why."""
+        """Return the components that prevent a solution between steps, with reasons."""
         if len(self._targets) > _MOST_INPUTS:
             return dict.fromkeys(self.names, f"it has more than {_MOST_INPUTS} inputs")
         reasons = {
@@ -179,23 +180,23 @@ class Ring:
 
     @property
     def is_closed(self) -> bool:
-        """True where each input has the value that arrives there."""
+        """True if each input has the value that arrives there."""
         return not _differ(*self._looked(), self._rest).any()
 
     def check(self) -> None:
-        """Close the ring where something about its components has changed."""
+        """Close the ring if a change of its components has opened it."""
         self._exchange()
         if not self.is_closed:
             self.close()
 
     def renew(self, always: bool = False) -> bool:
-        """Take what others feed it now, and close it.
+        """Take what other components feed the ring now, and close it.
 
         Args:
-            always: also where nothing has changed.
+            always: if set, also where nothing has changed.
 
         Returns:
-            Whether something has.
+            True if something has changed.
 
         """
         values, targets = self._values, self.outer.targets
@@ -208,10 +209,10 @@ class Ring:
         return True
 
     def close(self) -> None:
-        """Let each input have what arrives there.
+        """Iterate until each input has the value that arrives there.
 
         Raises:
-            ComponentFailed: they do not come to rest, or a component fails.
+            ComponentFailed: the values do not converge, or a component fails.
 
         """
         self._go_round()
@@ -256,7 +257,7 @@ class Ring:
             part.exchange()
 
     def _looked(self) -> tuple[np.ndarray, np.ndarray]:
-        """The values of the inputs, and those that arrive there."""
+        """Return the values of the inputs, and the values that arrive there."""
         values, targets = self._values, self._targets
         held = values[targets]
         for gather in self._inner:
@@ -266,7 +267,7 @@ class Ring:
         return held, arriving
 
     def _derivative(self) -> np.ndarray:
-        """The derivative of the inputs that are Reals, less the values that arrive there."""
+        """Return the derivative of the Real inputs minus the values that arrive there."""
         n = len(self._targets)
         found = np.zeros((n, n))
         factors = np.concatenate([gather.factors for gather in self._inner])
@@ -278,10 +279,10 @@ class Ring:
     def _step(
         self, held: np.ndarray, arriving: np.ndarray, derivative: np.ndarray, tries: int
     ) -> float:
-        """Make a step of Newton's method, half of it where that brings nothing, and so on.
+        """Make a step of Newton's method, halved until it reduces the difference.
 
         Returns:
-            The share of the difference that is left.
+            The remaining share of the difference.
 
         """
         try:
@@ -303,9 +304,9 @@ class Ring:
 
 
 def why_not_following(component: Component, instance: Instance, row: Row) -> str | None:
-    """Why values cannot pass through a component without a step; None: they can.
+    """Return why values cannot pass through a component without a step; None: they can.
 
-    They can if any output that is a Real follows any such input.
+    They can if any Real output follows any Real input.
     """
     inputs, outputs = (
         {
@@ -340,15 +341,15 @@ def why_not_following(component: Component, instance: Instance, row: Row) -> str
 def _differ(
     held: np.ndarray, arriving: np.ndarray, by: tuple[np.ndarray, np.ndarray]
 ) -> np.ndarray:
-    # Not numpy's isclose, which takes longer than the FMUs. What is not finite is named where the
-    # row is looked at.
+    # numpy's isclose takes longer than the FMUs. The check of the row reports values that are not
+    # finite.
     relative, absolute = by
     found: np.ndarray = np.abs(arriving - held) > absolute + relative * np.abs(held)
     return found
 
 
 def _is_real(system: System, connection: Connection) -> bool:
-    """True for a connection from a Real to a Real."""
+    """Return True for a connection from a Real to a Real."""
     return all(
         system.components[end.component].variables[end.port].family == "Real"
         for end in (connection.source, connection.target)
@@ -356,21 +357,21 @@ def _is_real(system: System, connection: Connection) -> bool:
 
 
 def _grain(system: System, connection: Connection) -> float:
-    """The share of a value that is lost on its way through a connection."""
+    """Return the relative rounding of a value on its way through a connection."""
     ends = (connection.source, connection.target)
     types = [system.components[end.component].variables[end.port].type for end in ends]
     return _GRAIN_OF_FLOAT32 if "Float32" in types else 0.0
 
 
 def _near(held: float, variable: Variable) -> float:
-    """A value of an input beside the one that it has."""
+    """Return a value near the present one of an input."""
     share = _CHANGE_OF_FLOAT32 if variable.type == "Float32" else _CHANGE
     change = share * max(abs(held), abs(_number(variable.nominal, 1.0)) or 1.0)
     return held + (change if held + change <= _number(variable.max, inf) else -change)
 
 
 def _number(text: str | None, otherwise: float) -> float:
-    """The number that a description gives, if it gives one."""
+    """Return the number in a description, or another one if there is none."""
     with suppress(ValueError):
         return otherwise if text is None else real(text)
     return otherwise

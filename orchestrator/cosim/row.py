@@ -22,39 +22,39 @@ from orchestrator.cosim.variables import (
     references_of,
 )
 
-#: A change so small, or so small a share of the value, is a rounding error.
+#: A smaller change, absolute or relative, is a rounding error.
 _ROUNDING = 1e-12
 
 FACTOR, OFFSET = Linear.UNCHANGED
 
 
 class Row:
-    """All inputs and outputs of a system side by side, as floats.
+    """All inputs and outputs of a system side by side, as doubles.
 
-    The ports of a component that have the same causality and type are neighbours, in the order
-    of its description, so that one FMI call moves them all.
+    Ports of a component with the same causality and type are neighbours, in the order of its
+    description, so that one FMI call moves all of them.
 
     Outputs of some components have a hidden place after all columns, into which their instance
-    writes them; they are shown once they are copied into their columns.
+    writes; they are shown once they are copied into their columns.
 
     Attributes:
-        values: of all ports, and the hidden ones.
+        values: of all ports, then the hidden ones.
         shown: a view of the columns only.
-        columns: where the value of a port is.
-        strings: what numbers in it stand for.
-        standing: the same for each port that may have such a number.
+        columns: index of each port's value.
+        strings: texts and integers that numbers in the row stand for.
+        standing: decoding of each port whose numbers may stand for other values.
 
     """
 
     def __init__(
         self, system: System, instances: Mapping[str, Instance], hidden: Collection[str] = ()
     ) -> None:
-        """Lay out the row, tie the instances to it, and enter the inputs' values at the start.
+        """Lay out the row, tie the instances to it, and enter the start values of inputs.
 
         Args:
-            system: whose ports these are.
+            system: with the ports.
             instances: of its components.
-            hidden: the components whose outputs are hidden at first.
+            hidden: components whose outputs are hidden at first.
 
         """
         groups = [
@@ -110,38 +110,39 @@ class Row:
         return [port for port, causality, _ in self._ports[component] if causality == "output"]
 
     def enter(self, values: Mapping[PortName, Value]) -> None:
-        """Take values of ports, except any that are not finite numbers."""
+        """Enter values of ports, except those that are not finite numbers."""
         for port, value in values.items():
             if port in self.columns and isfinite(number := self.number(value)):
                 self.values[self.columns[port]] = number
 
     def number(self, value: Value) -> float:
-        """The number that stands for a value in the row."""
+        """Return the number that stands for a value in the row."""
         return self.strings.stand_in(value)
 
     def number_of(self, port: PortName, value: float) -> float:
-        """The number that stands for a value of a port in the row."""
+        """Return the number that stands for a value of a port in the row."""
         return self.standing[port].number(value) if port in self.standing else float(value)
 
     def value(self, port: PortName) -> Value:
-        """The value of a port."""
+        """Return the value of a port."""
         number = float(self.values[self.columns[port]])
         return self.standing[port].value(number) if port in self.standing else number
 
     def inputs_of(self, fmi_type: str) -> list[int]:
-        """The columns of the inputs of a type."""
+        """Return the columns of the inputs of a type."""
         return self._inputs.get(fmi_type, [])
 
     def wrong(self, components: Iterable[str], passed: bool = False) -> str | None:
-        """The first value that is not finite or not of an input's type, in words.
+        """Describe the first value that is not finite or does not fit an input's type.
 
         Args:
-            components: in the order in which they are stepped: others may have passed it on.
-            passed: whether all values are of one time: then states come first, and of these what
-                no wrong input has reached.
+            components: in the order in which they are stepped, since a component may pass a value
+                on.
+            passed: if set, all values are of one time: states come first, starting with those of
+                components that no wrong input has reached.
 
         Returns:
-            What is wrong and where it comes from; None: nothing is.
+            The value and its source, in words; None: all values are right.
 
         """
         fit = all(are_of(of, self.values[places]).all() for of, places in self._inputs.items())
@@ -174,25 +175,25 @@ class Row:
         return passed_on
 
     def _passes(self, port: PortName, causality: str) -> bool:
-        """True for an input, and an output with direct feedthrough."""
+        """Return True for an input, and for an output with direct feedthrough."""
         return causality == "input" or self._components[port.component].has_feedthrough(port.port)
 
     def moving(self, before: np.ndarray) -> list[PortName]:
-        """The ports whose values are not what they were, apart from rounding."""
+        """Return the ports whose values have changed by more than rounding."""
         same = np.isclose(self.values, before, rtol=_ROUNDING, atol=_ROUNDING)
         standing = [self.columns[port] for port in self.standing]
         same[standing] = self.values[standing] == before[standing]
         return [port for port, column in self.columns.items() if not same[column]]
 
     def places(self, connections: Sequence[Connection]) -> tuple[np.ndarray, np.ndarray]:
-        """The columns of the targets and of the sources of some connections."""
+        """Return the columns of the targets and of the sources of some connections."""
         return (
             np.array([self.columns[c.target] for c in connections], dtype=np.intp),
             np.array([self.columns[c.source] for c in connections], dtype=np.intp),
         )
 
     def hidden(self, ports: Sequence[PortName]) -> tuple[np.ndarray, np.ndarray]:
-        """The columns and the hidden places of those of some outputs that have both."""
+        """Return the columns and the hidden places of those outputs that have both."""
         known = [port for port in ports if port in self._hidden]
         return (
             np.array([self.columns[port] for port in known], dtype=np.intp),
@@ -211,24 +212,25 @@ def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
 
 
 def ports_of_type(component: Component, causality: str, fmi_type: str) -> list[Variable]:
-    """The inputs or outputs of a type, in the order of a row."""
+    """Return the inputs or outputs of a type, in the order of a row."""
     return [variable for variable in component.having(causality) if variable.type == fmi_type]
 
 
 class Gathering:
-    """Values moved within the row at the same time, each times a factor, plus an offset.
+    """Values moved within the row at the same time, each multiplied by a factor, plus an offset.
 
     Attributes:
-        targets, sources: where they are in the row.
-        factors, offsets: one for each.
-        mapped: places of those that are mapped first, and what to; others stay what they are.
-        acts: whether there are any values.
-        is_plain: whether there are, and all arrive as they are.
+        targets, sources: columns of the row.
+        factors, offsets: one of each for each value.
+        mapped: new values by old ones, by the places of values that are mapped first; unlisted
+            values stay.
+        acts: True if there are any values.
+        is_plain: True if there are values and none changes.
 
     """
 
     def __init__(self, targets: np.ndarray, sources: np.ndarray) -> None:
-        """Move values as they are."""
+        """Move values without a change."""
         self.targets, self.sources = targets, sources
         self.factors = np.full(len(targets), FACTOR)
         self.offsets = np.full(len(targets), OFFSET)
@@ -237,7 +239,7 @@ class Gathering:
 
     @classmethod
     def along(cls, row: Row, connections: Sequence[Connection]) -> Gathering:
-        """The values that inputs take along some connections."""
+        """Gather the values that inputs take along some connections."""
         gathering = cls(*row.places(connections))
         for place, connection in enumerate(connections):
             match connection.transformation:
@@ -270,19 +272,19 @@ class Gathering:
         values[self.targets[place]] = self.factors[place] * taken + self.offsets[place]
 
     def set(self, place: int, factor: float, offset: float) -> None:
-        """Set the change to one of the values."""
+        """Set the factor and the offset of one of the values."""
         self.factors[place], self.offsets[place] = factor, offset
         plain = (self.factors == FACTOR) & (self.offsets == OFFSET) & np.signbit(self.offsets)
         self.is_plain = bool(plain.all()) and not self.mapped
 
 
 class Overrides:
-    """Everything that is gathered in a step, and temporary changes to it."""
+    """Everything that a step gathers, and temporary changes to it."""
 
     def __init__(
         self, row: Row, gatherings: Iterable[Gathering], connections: Sequence[Connection]
     ) -> None:
-        """Know where every input takes its value from.
+        """Find where every input takes its value.
 
         Args:
             row: of all values.
@@ -291,27 +293,28 @@ class Overrides:
 
         """
         self._row = row
-        # An input of a solved ring is gathered in more than one place.
+        # An input of a solved ring is gathered in several places.
         self._fed: dict[int, list[tuple[Gathering, int]]] = {}
         for gathering in gatherings:
             for place, column in enumerate(gathering.targets.tolist()):
                 self._fed.setdefault(column, []).append((gathering, place))
         self._own = {column: _factor_and_offset(fed) for column, fed in self._fed.items()}
         self._targets = [connection.target for connection in connections]
-        # For inputs that nothing feeds: the value without a change, its factor and its offset.
+        # Unconnected inputs that are changed: the value without the change, its factor and its
+        # offset.
         self._open: dict[int, tuple[float, float, float]] = {}
 
     def override(self, target: PortName, value: Value) -> None:
-        """Let an input take a value, whatever feeds it."""
+        """Give an input a value, whatever feeds it."""
         self._alter(target, 0.0, self._row.number(value))
 
     def bias(self, target: PortName, offset: float) -> None:
-        """Let an input take the value that it would take, and something more."""
+        """Add an offset to what an input takes."""
         factor, own = self._own.get(self._row.columns[target], (FACTOR, OFFSET))
         self._alter(target, factor, own + offset)
 
     def release(self, target: PortName) -> None:
-        """Let an input take what feeds it, or what it would have."""
+        """Undo all changes of an input."""
         column = self._row.columns[target]
         if column in self._fed:
             self._alter(target, *self._own[column])
@@ -319,7 +322,7 @@ class Overrides:
             self._row.values[column], _, _ = self._open.pop(column)
 
     def supply(self, target: PortName, value: Value) -> None:
-        """Let an input that nothing feeds have a value, which is altered as one that is fed is."""
+        """Give an unconnected input a value, to which its changes apply."""
         value = self._row.number(value)
         column = self._row.columns[target]
         if column in self._open:
@@ -329,27 +332,27 @@ class Overrides:
         self._row.values[column] = value
 
     def supplied(self, target: PortName) -> float:
-        """The value of an input that nothing feeds, before it is altered."""
+        """Return the value of an unconnected input without its changes."""
         column = self._row.columns[target]
         value, *_ = self._open.get(column, (float(self._row.values[column]),))
         return value
 
     def refresh(self, component: str) -> None:
-        """Let the inputs of a component take at once what feeds them."""
+        """Update the inputs of a component from their sources at once."""
         for target in self._targets:
             if target.component == component:
                 gathering, place = self._fed[self._row.columns[target]][0]
                 gathering.move(self._row.values, place)
 
     def state(self) -> dict[str, Any]:
-        """The changes, as JSON has them."""
+        """Return the changes as JSON."""
         return {
             "fed": [(column, *_factor_and_offset(fed)) for column, fed in self._fed.items()],
             "open": list(self._open.items()),
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Do to them what was done before; the row is left as it is."""
+        """Restore the changes; the row is left as it is."""
         for column, factor, offset in state["fed"]:
             for gathering, place in self._fed[column]:
                 gathering.set(place, factor, offset)

@@ -1,4 +1,4 @@
-"""A run from the first exchange of values to the last step."""
+"""A run, from the first exchange of values to the last step."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.machine.texts import literal
 
 
-# A value that overflows on its way is named as the value of a port.
+# Overflowing values are reported as the value of a port, not by numpy.
 @np.errstate(all="ignore")
 @default_mode()
 def simulate_plan(
@@ -38,17 +38,17 @@ def simulate_plan(
     """Run a system.
 
     Args:
-        plan: what to run, as :func:`.plan.make_plan` gives it.
+        plan: made by :func:`.plan.make_plan`.
         observers: take the rows.
         hooks: act between the steps, in this order.
-        exchange: of values.
+        exchange: of values between components.
 
     Returns:
-        How the run has ended: after a failure the observers have the rows before it.
+        How the run ended; after a failure the observers have the rows before it.
 
     Raises:
         InputError: an FMU or a parameter is not usable; nothing was stepped.
-        KeyboardInterrupt: a signal has come to stop it, and an FMU does not come to its first step.
+        KeyboardInterrupt: a signal arrived, and an FMU does not come to its first step.
 
     """
     system, experiment = plan.system, plan.experiment
@@ -62,7 +62,8 @@ def simulate_plan(
             instances = stack.enter_context(
                 place_instances(system.components, log, plan.isolation, interrupts)
             )
-            # Before their processes are ended: a copy must not do that for the process itself.
+            # Entered after the instances, so that it is left before their processes are ended: a
+            # forked copy of this process must not end them.
             stack.enter_context(surroundings)
             stepping = _possible_stepping(stepping, instances, log)
             row = Row(system, instances, slow)
@@ -94,13 +95,13 @@ def simulate_plan(
             try:
                 failure = _advance(run, stepping, Hooks(run), order, surroundings)
             except NotKept as error:
-                # Rows that cannot be kept need not be computed.
+                # A run whose rows cannot be kept stops.
                 failure = str(error)
             except Ended as end:
                 failure, remark = None, str(end)
             if failure is None:
                 for instance in instances.values():
-                    # The rows are there whether it can or not.
+                    # The rows are complete even if the FMU fails to terminate.
                     with suppress(ComponentFailed):
                         instance.terminate()
             ending = Ending(
@@ -111,7 +112,7 @@ def simulate_plan(
 
 
 def _possible_stepping(stepping: Stepping, instances: Mapping[str, Instance], log: Log) -> Stepping:
-    """The stepping, or the one in Python where the other has nothing to call."""
+    """Return the stepping, or the Python loop where an FMU runs in another process."""
     apart = [name for name, instance in instances.items() if not instance.is_here]
     if not apart or stepping == PYTHON_LOOP:
         return stepping
@@ -125,9 +126,9 @@ def _possible_stepping(stepping: Stepping, instances: Mapping[str, Instance], lo
 def _parameters(
     system: System, instances: Mapping[str, Instance], log: Log
 ) -> dict[PortName, object]:
-    """Values of all parameters as the FMUs hold them; the log names any that were not kept.
+    """Return the values of all parameters as the FMUs hold them, and log those that were not kept.
 
-    Some FMUs overwrite values without a word.
+    Some FMUs overwrite values silently.
     """
     parameters: dict[PortName, object] = {}
     for name, instance in instances.items():
@@ -148,7 +149,7 @@ def _parameters(
 
 
 def _units(system: System, columns: Iterable[PortName]) -> dict[str, str]:
-    """The units of columns that have one."""
+    """Return the units of the columns that have one."""
     units = {
         str(name): system.components[name.component].variables[name.port].unit for name in columns
     }
@@ -162,7 +163,7 @@ def _advance(
     order: Sequence[str],
     surroundings: Surroundings,
 ) -> str | None:
-    """Step to the end, or to the first failure, and say what it was."""
+    """Step to the end or to the first failure, and return the failure."""
     blocks, failure = run.blocks, None
     try:
         hooks.act()
@@ -189,7 +190,7 @@ def _advance(
     except Exception as error:
         failure = f"stopped at t = {run.time:.12g} s: {unforeseen(error)}"
     surroundings.put_back()
-    # Also where another component has refused it in the same step.
+    # Checked even if another component has refused the value in the same step.
     if wrong := run.row.wrong(order, run.passing is not None):
         failure = f"stopped at t = {run.experiment.time(blocks.count):.12g} s: {wrong}"
     blocks.hand_over()
@@ -198,7 +199,7 @@ def _advance(
 
 @contextmanager
 def _explained() -> Iterator[None]:
-    """A component that fails before the first step."""
+    """Raise an InputError for a component that fails before the first step."""
     try:
         yield
     except ComponentFailed as error:
@@ -209,7 +210,7 @@ def _explained() -> Iterator[None]:
 def _observed(
     header: Header, observers: Sequence[Observer], surroundings: Surroundings
 ) -> Iterator[Callable[[Ending], None]]:
-    """Tell observers of the beginning, and of the end even where one of them fails."""
+    """Begin and end observers; all of them are ended, even if one fails."""
     begun: list[Observer] = []
 
     def tell(ending: Ending) -> None:

@@ -1,8 +1,7 @@
-"""The stages of a communication step: by the names of its components, and as calls of FMUs.
+"""The stages of a communication step, by the names of components and as calls of FMUs.
 
-Loaded FMUs decide which stages a step has: where rings are solved, and, for FMUs of other tools,
-where no order is stated. Before a stage is stepped its inputs are gathered; the outputs of a
-component are read as soon as it was stepped.
+Loaded FMUs decide which stages a step has: where rings are solved and, for third-party FMUs, where
+no order is stated. Inputs are gathered before a stage is stepped; outputs are read after it.
 
 - `feedthrough`: two parts. First values of t_k pass: a component whose outputs have direct
   feedthrough takes its inputs and is read without a step, before those it feeds. The row shows
@@ -13,20 +12,21 @@ component are read as soon as it was stepped.
   without feedthrough are states: all take them at t_k.
 - the names of all components: the same in the order that they stand in.
 
-A ring of feedthroughs that is not solved is opened before the one of its components that stands
-first in the system, which takes what feeds it at t_k.
+A ring of feedthroughs that is not solved is opened before its first component in the system, which
+takes what feeds it at t_k.
 
-In `feedthrough` order values pass first, then all components are stepped. Rings of feedthroughs
-that are solved are closed where values come to them.
+In `feedthrough` order values pass first, then all components are stepped. Solved rings are closed
+where values come to them.
 
-In other orders such rings have stages of their own. Each is closed before its components are
-stepped, with their states of t_k, after that, with those of t_k+1 and the latest of what feeds it,
-and again when all have been stepped: every row shows its solution.
+In other orders such rings have stages of their own. Each is closed three times: before its
+components are stepped, with their states of t_k; after that, with their states of t_k+1 and the
+latest values that feed it; and when all components have been stepped, so that every row shows its
+solution.
 
-A component may span n communication steps in one step. It is stepped at every n-th t_k, with
-the inputs of that time, which it holds. What it computes waits in hidden columns of the row until
-the time has come that it belongs to. Outputs with direct feedthrough hold from t_k on: they are
-shown when they pass, or as soon as the component was stepped, unless the order is `jacobi`.
+A component may span n communication steps in one step. It is stepped at every n-th t_k, with the
+inputs of that time. Its results wait in hidden columns of the row until their time. Outputs with
+direct feedthrough hold from t_k on: they are shown when they pass, or as soon as the component was
+stepped, unless the order is `jacobi`.
 """
 
 from __future__ import annotations
@@ -59,17 +59,17 @@ from orchestrator.cosim.system import System
 from orchestrator.cosim.variables import TYPES
 from orchestrator.machine.errors import shortened
 
-#: By names or as calls.
+#: A stage by names or as calls.
 AnyStage = TypeVar("AnyStage", "Stage", "LinkedStage")
 
-#: Which outputs are read: all; those with direct feedthrough; the others, which are states; of
-#: these, the ones that are not read together with the former.
+#: Outputs that are read: all; those with direct feedthrough; the others, which are states; or only
+#: those states that no call reads together with the former.
 Reads: TypeAlias = Literal["all", "direct", "states", "only states"]
 READS: tuple[Reads, ...] = get_args(Reads)
 ALL, DIRECT, STATES, ONLY_STATES = READS
 
-#: Ways to close a ring: where something about its components has changed; where that or what others
-#: feed it has, which it takes; with what others feed it, in any case.
+#: Ways to close a ring: if its components have changed; if they or the values that feed it have
+#: changed, which it takes; or always, with the values that feed it.
 Closing: TypeAlias = Literal["check", "renew", "renew always"]
 CLOSINGS: tuple[Closing, ...] = get_args(Closing)
 CHECK, RENEW, RENEW_ALWAYS = CLOSINGS
@@ -83,15 +83,15 @@ _CLOSES: Mapping[Closing, Callable[[Ring], object]] = {
 
 
 class Arrangement(NamedTuple):
-    """The order of the components of a system, in stages, where it is known which rings are solved.
+    """The order of components, in stages, for known solved rings.
 
     Attributes:
         order: of the components.
-        solved: rings of them that are stepped as one, in stages of their own.
-        settling: stages in which values settle at one time: a component with direct feedthrough
-            comes before those that it feeds.
-        late: connections with direct feedthrough that are a step late in these.
-        stages: in which components are stepped; within one they are independent.
+        solved: rings whose components are stepped as one, in stages of their own.
+        settling: stages for values of one time: a component with direct feedthrough comes before
+            those that it feeds.
+        late: connections with direct feedthrough that are a step late in these stages.
+        stages: in which components are stepped; components of one stage are independent.
 
     """
 
@@ -102,10 +102,10 @@ class Arrangement(NamedTuple):
     stages: Sequence[Sequence[str]]
 
     def delays(self, reasons: Mapping[str, str] | None = None) -> list[str]:
-        """The places where rings are opened, in words.
+        """Return a line for each place where a ring is opened.
 
         Args:
-            reasons: why components are in no ring that is solved.
+            reasons: why components are not part of a solved ring.
 
         """
         late: dict[str, list[PortName]] = {}
@@ -124,9 +124,9 @@ def arrange(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) 
     """Arrange the components of a system.
 
     Args:
-        system: that is stepped.
-        order: of its components; one that is stated names each of them once.
-        solved: rings of them that are stepped as one.
+        system: to run.
+        order: of the components; a stated one names each of them once.
+        solved: rings whose components are stepped as one.
 
     """
     derived = system.derived_order(solved)
@@ -145,13 +145,12 @@ def arrange(system: System, order: Order, solved: Sequence[Sequence[str]] = ()) 
 def gathered_connections(
     system: System, arrangement: Arrangement, *, latest: bool = False
 ) -> list[list[Connection]]:
-    """The connections along which values are gathered before each stage.
+    """Return the connections along which values are gathered before each stage.
 
     Args:
-        system: whose connections say what feeds what.
-        arrangement: of its components; rings that are solved gather by themselves what they feed
-            themselves.
-        latest: whether stages take all that those before them have computed.
+        system: with the connections.
+        arrangement: of its components; solved rings gather by themselves what they feed themselves.
+        latest: if set, stages take all outputs that the stages before them have computed.
 
     """
     stage_of = {name: i for i, names in enumerate(arrangement.stages) for name in names}
@@ -173,10 +172,10 @@ class Visit(NamedTuple):
     """The work of a component in a stage.
 
     Attributes:
-        component: its name.
-        takes: whether it takes its inputs.
-        steps: whether it makes a step; else values pass through it.
-        reads: which of its outputs are read then.
+        component: name of the component.
+        takes: True if it takes its inputs.
+        steps: True if it makes a step; else values pass through it.
+        reads: the outputs that are read then.
 
     """
 
@@ -192,7 +191,7 @@ class Visit(NamedTuple):
         feedthrough must not share their type with any of these.
 
         Args:
-            component: the one that is visited.
+            component: of the visit.
             outputs: names of its outputs.
 
         """
@@ -209,11 +208,11 @@ class Visit(NamedTuple):
 
 
 class Close(NamedTuple):
-    """A ring that is closed in a stage.
+    """The closing of a ring in a stage.
 
     Attributes:
         ring: names of its components, in the order in which values go round.
-        how: it is closed.
+        how: a way to close it.
 
     """
 
@@ -222,11 +221,11 @@ class Close(NamedTuple):
 
 
 class Decimation(NamedTuple):
-    """When a slow component is stepped, or its outputs are shown.
+    """The communication steps in which a slow component is stepped, or its outputs are shown.
 
     Attributes:
-        every: how many communication steps one of its steps spans.
-        at_end: whether in the last of them, not in the first.
+        every: number of communication steps in one of its steps.
+        at_end: if set, the last of these steps, else the first.
 
     """
 
@@ -234,21 +233,21 @@ class Decimation(NamedTuple):
     at_end: bool = False
 
     def is_due(self, k: int, steps: int) -> bool:
-        """True in the communication step after the k-th of so many, or at the end of all."""
+        """Return True in the communication step after the k-th of all steps, or at their end."""
         k += self.at_end
         return k % self.every == 0 or k == steps
 
 
 class Stage(NamedTuple):
-    """Values to move, and what components do then.
+    """Values to move, and the work of components after that.
 
     Attributes:
-        connections: along which inputs take their values at the same time.
+        connections: inputs take their values along these at the same time.
         visits: of components, which may run side by side until their outputs are read.
         closings: of rings; a stage with any has no visits.
-        shows: outputs whose hidden values are copied into their columns; there are no connections
-            then.
-        decimation: in which communication steps; None: in all of them.
+        shows: outputs whose hidden values are copied into their columns; such a stage has no
+            connections.
+        decimation: the communication steps of the stage; None: all of them.
 
     """
 
@@ -260,17 +259,17 @@ class Stage(NamedTuple):
 
     @property
     def acts(self) -> bool:
-        """True where there is anything to do."""
+        """True if there is anything to do."""
         return bool(self.connections or self.visits or self.closings or self.shows)
 
 
 class Stages(NamedTuple, Generic[AnyStage]):
-    """The stages of every communication step; in each there is something to do.
+    """The stages of every communication step, each with something to do.
 
     Attributes:
         stepping: in which all components are stepped.
-        passing: in which values of t_k pass before a row shows them and all are stepped; None: the
-            row is shown once all have been stepped.
+        passing: in which values of t_k pass before the row shows them and all components are
+            stepped; None: the row is shown after all components have been stepped.
 
     """
 
@@ -285,13 +284,13 @@ def stages_of(
     *,
     latest: bool = False,
 ) -> Stages[Stage]:
-    """The stages of every step.
+    """Return the stages of every step.
 
     Args:
-        system: that is run.
+        system: to run.
         arrangement: of its components.
-        decimation: how many communication steps one step of each component takes.
-        latest: whether stages take all that those before them have computed.
+        decimation: number of communication steps in one step of each component.
+        latest: if set, stages take all outputs that the stages before them have computed.
 
     """
     order, rings = arrangement.order, arrangement.solved
@@ -307,7 +306,7 @@ def stages_of(
         fast = [Visit(name) for name in names if decimation[name] == 1]
         here = [ring_of[name] for name in names if name in ring_of]
         if here:
-            # All are stepped before one takes what another has come to.
+            # All components of a ring are stepped before one takes new values of another.
             stepping += [
                 Stage(taken, closings=[Close(ring, CHECK) for ring in here]),
                 Stage(visits=fast),
@@ -334,7 +333,7 @@ def _passing_first(
     decimation: Mapping[str, int],
     gathered: Sequence[Sequence[Connection]],
 ) -> Stages[Stage]:
-    """The stages in feedthrough order."""
+    """Return the stages in feedthrough order."""
     components, rings = system.components, arrangement.solved
     outputs = {
         name: [PortName(name, output.name) for output in component.having("output")]
@@ -370,14 +369,15 @@ def _passing_first(
             if name in ring_of
         ]
     place = {name: i for i, names in enumerate(arrangement.stages) for name in names}
-    # An output that is read when values pass is read after a step too if something takes it before.
+    # An output that is read when values pass is read again after a step if something takes it
+    # earlier.
     early = {
         one.source.component
         for one in system.connections
         if place[one.source.component] >= place[one.target.component]
     }
-    # Whatever takes an output with direct feedthrough then, takes what follows from the inputs of
-    # this step.
+    # What takes an output with direct feedthrough before it passes, takes the one that follows from
+    # the inputs of this step.
     late = {one.source.component for one in arrangement.late}
 
     def stepped(name: str) -> Visit:
@@ -402,7 +402,7 @@ def _passing_first(
 def _taken(
     connections: Sequence[Connection], decimation: Mapping[str, int]
 ) -> tuple[list[Stage], list[Connection]]:
-    """The stages in which slow components take their inputs, and the connections of the others."""
+    """Return the stages in which slow components take their inputs, and the other connections."""
     taken: dict[int, list[Connection]] = {1: []}
     for connection in connections:
         taken.setdefault(decimation[connection.target.component], []).append(connection)
@@ -411,7 +411,7 @@ def _taken(
 
 
 def _shown(component: Component, order: Order) -> tuple[list[PortName], list[PortName]]:
-    """The outputs of a slow component: those shown when it was stepped, and the others."""
+    """Return the outputs of a slow component that are shown when it was stepped, and the others."""
     early: list[PortName] = []
     later: list[PortName] = []
     for output in component.having("output"):
@@ -425,7 +425,7 @@ def _acting(stages: Sequence[Stage]) -> list[Stage]:
 
 
 class Member(NamedTuple):
-    """The calls that step one component, or let values pass through it."""
+    """The calls that step a component, or let values pass through it."""
 
     set_inputs: list[Callable[[], int]]
     do_step: Callable[[c_double, c_double, int], int] | None
@@ -434,16 +434,16 @@ class Member(NamedTuple):
 
 
 class StageCall:
-    """Takes the place of an instance in a stage that acts but steps no component."""
+    """Replaces an instance in a stage that acts but steps no component."""
 
     name, is_here = "", True
     get_outputs: ClassVar[list[Callable[[], int]]] = []
 
     def __init__(self, act: Callable[[float, float], object]) -> None:
-        """Do something in every step.
+        """Call a function in every step.
 
         Args:
-            act: what to do, with the time and the length of the step.
+            act: takes the time and the length of the step.
 
         """
         self._act = act
@@ -452,20 +452,20 @@ class StageCall:
 
     @property
     def member(self) -> Member:
-        """As the loops know it."""
+        """Member of a stage."""
         return Member([], self.do_step, [], self)
 
     def do_step(self, t: c_double, h: c_double, _: int) -> int:
-        """Act; the status says whether it went well."""
+        """Act, and return a status."""
         return self._tried(t.value, h.value)
 
     def failed(self, status: int, function: str) -> Exception:
-        """The exception that it has raised."""
+        """Return the exception that was raised."""
         assert self._error is not None
         return self._error
 
     def pointers(self) -> CMember:
-        """The same for the compiled loop."""
+        """Return the pointers for the compiled loop."""
         nothing = (CMove * 0)()
         return CMember(None, address_of(self._called_back), None, nothing, nothing, 0, 0)
 
@@ -473,7 +473,7 @@ class StageCall:
         try:
             self._act(t, h)
         except Exception as error:
-            # No exception can leave through the compiled loop.
+            # An exception cannot pass through the compiled loop.
             self._error = error
             return int(fmi2Error)
         return int(fmi2OK)
@@ -484,8 +484,8 @@ class LinkedStage(NamedTuple):
 
     Attributes:
         gather: moves values within the row.
-        members: the components.
-        decimation: in which communication steps; None: in all of them.
+        members: components to step.
+        decimation: the communication steps of the stage; None: all of them.
 
     """
 
@@ -501,14 +501,14 @@ def link_stages(
     row: Row,
     rings: Sequence[Ring] = (),
 ) -> Stages[LinkedStage]:
-    """The stages of every step as calls.
+    """Turn the stages of every step into calls.
 
     Args:
         stages: by the names of components.
-        system: that is run.
+        system: to run.
         instances: of all components.
         row: that they are tied to.
-        rings: that are solved.
+        rings: solved rings.
 
     """
     ring_of = {ring.names[0]: ring for ring in rings}
@@ -537,12 +537,12 @@ def link_stages(
 
 
 def member(instance: Instance) -> Member:
-    """The calls of an instance that is tied to a row."""
+    """Return the calls of an instance that is tied to a row."""
     return Member(instance.set_inputs, instance.do_step, instance.get_outputs, instance)
 
 
 def _visiting(visit: Visit, instance: Instance, component: Component) -> Member:
-    """The calls that do what a component does in a stage."""
+    """Return the calls for the work of a component in a stage."""
     return Member(
         instance.set_inputs if visit.takes else [],
         instance.do_step if visit.steps else instance.do_exchange,
@@ -553,7 +553,7 @@ def _visiting(visit: Visit, instance: Instance, component: Component) -> Member:
 
 def _reading(visit: Visit, instance: Instance, component: Component) -> list[Callable[[], int]]:
     """Return the calls that read outputs of a component, one for each type."""
-    # The answer of another process has to be taken.
+    # The answer of another process must be taken in any case.
     if visit.reads == ALL or not instance.is_here:
         return instance.get_outputs
     outputs = component.having("output")
@@ -577,15 +577,15 @@ def make_stages(
     Args:
         stages: to make.
         values: of the row.
-        experiment: that the step belongs to.
-        steps: how many there are.
-        k: how many were made before.
+        experiment: of the run.
+        steps: number of steps of the run.
+        k: number of steps made before.
         t, h: beginning and length of the step [s].
 
     """
     for gather, members, decimation in stages:
         if decimation is None:
-            # Most stages are like this: it costs no call.
+            # Most stages are like this: no call is needed.
             if gather.is_plain:
                 values[gather.targets] = values[gather.sources]
             elif gather.acts:
@@ -599,14 +599,14 @@ def make_stages(
 def step_members(
     members: Sequence[Member], t: c_double, h: c_double, is_final: bool = True
 ) -> None:
-    """Step the components of a stage, which may run side by side until their outputs are asked.
+    """Step the components of a stage; they may run side by side until their outputs are read.
 
-    Values only pass through a component whose calls have no step.
+    Values only pass through a component without a step.
 
     Args:
         members: the components.
         t, h: beginning and length of the step [s].
-        is_final: whether no component will go back to its beginning.
+        is_final: False if a component may go back to the beginning of the step.
 
     """
     for set_inputs, do_step, _, instance in members:
@@ -619,7 +619,7 @@ def step_members(
             and status != fmi2Warning
         ):
             raise instance.failed(status, DO_STEP)
-        # To call a function that looks costs more than to look.
+        # Testing here is cheaper than calling a function that tests.
         if A * B * C != PRODUCT:
             restore_mode()
     for _, _, get_outputs, instance in members:

@@ -1,4 +1,4 @@
-"""The system that is simulated: components, connections, parameters; rings, orders and stages."""
+"""The system to simulate: components, connections, parameters; rings, orders and stages."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ from orchestrator.machine.errors import InputError, did_you_mean, listed
 from orchestrator.machine.file_names import plain_file_names
 from orchestrator.machine.texts import is_finite
 
-#: What each component waits for: the components whose direct feedthrough feeds it.
+#: For each component, the components whose direct feedthrough feeds it.
 Sources = Mapping[str, Collection[str]]
 
 
 def without_rings(sources: Sources) -> dict[str, set[str]]:
-    """What each waits for once all rings are opened: in a ring, for the one before it."""
+    """Open all rings: in a ring, each component waits for the one before it."""
     place = {name: i for i, name in enumerate(sources)}
     found: dict[str, set[str]] = {}
     for part in strongly_connected(sources):
@@ -48,9 +48,9 @@ def without_rings(sources: Sources) -> dict[str, set[str]]:
 
 
 def in_levels(sources: Sources, last: Collection[str]) -> list[str]:
-    """The components of a graph without rings: first those that wait for nothing, and so on.
+    """Order the components of a graph without rings: first those that wait for nothing, and so on.
 
-    Some come last, when nothing else is left that does not wait for them.
+    Those in `last` come when all others are left that wait for them.
     """
     missing = {name: len(feeding) for name, feeding in sources.items()}
     fed: dict[str, list[str]] = {name: [] for name in sources}
@@ -77,12 +77,12 @@ def in_levels(sources: Sources, last: Collection[str]) -> list[str]:
 
 
 def opened(ring: Sequence[str], sources: Sources, place: Mapping[str, int]) -> list[str]:
-    """A ring in the order in which it is opened: its first, then the rest, part by part.
+    """Order the components of a ring as it is opened: the first, then the rest, part by part.
 
-    What is left of a ring may be rings again, and so on inwards. They are found from the inmost
-    outwards: components are added to a graph, the last first, and each of them becomes one with
-    those that it closes a ring with. That takes time in proportion to the connections, except
-    for rings that are made to be slow.
+    The rest of a ring may contain rings again, and so on inwards. They are found from the innermost
+    outwards: components are added to a graph, the last first, and each is merged with those that it
+    closes a ring with. The time is proportional to the number of connections, except for rings that
+    are constructed to be slow.
     """
     lead: dict[str, str] = {}
     feeding: dict[str, set[str]] = {}
@@ -120,9 +120,9 @@ def opened(ring: Sequence[str], sources: Sources, place: Mapping[str, int]) -> l
 
 
 def _closing(first: str, feeding: Mapping[str, set[str]], fed: Mapping[str, set[str]]) -> set[str]:
-    """What feeds a component, directly or through others, and is fed by it.
+    """Return the components that feed one, directly or not, and are fed by it.
 
-    The search goes both ways at the same time, until one of them has come to its end.
+    The search goes both ways at the same time, until one of them ends.
     """
     ways = (feeding, fed)
     found: tuple[set[str], set[str]] = (set(), set())
@@ -144,10 +144,10 @@ def _closing(first: str, feeding: Mapping[str, set[str]], fed: Mapping[str, set[
 
 
 def strongly_connected(sources: Sources) -> list[list[str]]:
-    """Components in parts of which each waits for all others of its part (Tarjan 1972).
+    """Return the strongly connected parts of the graph (Tarjan 1972).
 
     Returns:
-        The parts; one comes after those that it waits for.
+        The parts, each after those that it waits for.
 
     """
     number: dict[str, int] = {}
@@ -187,32 +187,32 @@ def strongly_connected(sources: Sources) -> list[list[str]]:
     return parts
 
 
-#: Values by the names of ports or of groups, taken apart or as text.
+#: Values by names of ports or of groups, as names or as texts.
 Values = Mapping[PortName, object] | Mapping[str, object]
 
-#: Stands for any part of a component's name, between two dots.
+#: Stands for any text between two dots of a component's name.
 STAR = "*"
 
-#: So many times a common measure of steps may go into the smallest of them.
+#: Largest quotient of the smallest step and a common divisor of all steps.
 _MOST_PARTS = 1000
 
-#: What is between the names of a group and of its members.
+#: Characters between the names of a group and of its members.
 _MEMBER = (".", "[")
 
 
 @dataclass(frozen=True)
 class System:
-    """Components, how they are connected, and the values of their parameters.
+    """Components, their connections, and the values of their parameters.
 
     Attributes:
         name: of the system.
-        components: by the names of their instances.
-        connections: in the order in which they were stated.
+        components: by name of instance.
+        connections: in the order of their statement.
         parameters: values that differ from the components' own, in the variables' types.
-        start_time, stop_time, step: the experiment that the system asks for [s]; None: it names
-            none.
-        steps: of components that ask for one of their own [s].
-        left_open: inputs that are meant to have no source.
+        start_time, stop_time, step: of the experiment that the system asks for [s]; None: it does
+            not ask.
+        steps: of components with a step of their own [s].
+        left_open: inputs that are open on purpose.
 
     """
 
@@ -231,11 +231,11 @@ class System:
         return f"<System {self.name}: {', '.join(self.components)}>"
 
     def with_parameters(self, values: Values) -> System:
-        """The same system with further values, which win over its own.
+        """Return the system with further values, which replace its own.
 
         Args:
-            values: by the names of their ports, or of groups, as for :meth:`expanded`; text is
-                read as the command line reads it.
+            values: by names of ports or of groups, as for :meth:`expanded`; texts are read like
+                those of a command line.
 
         Raises:
             InputError: there is no such port, or the value is not of its type or out of range.
@@ -253,13 +253,13 @@ class System:
         return replace(self, parameters={**self.parameters, **new})
 
     def expanded(self, values: Values) -> dict[PortName, object]:
-        """Values by ports only: a list for a group has a value for each member. The last one wins.
+        """Return values by ports; a list for a group has a value for each member; the last wins.
 
         A star in a component's name stands for any text without a dot. A value that
         :meth:`is_spread` differs from component to component. Names without a star win.
 
         Raises:
-            InputError: a name is not one of a port, or there are not as many values as ports.
+            InputError: a name is not a port's, or the numbers of values and ports differ.
 
         """
         found: dict[PortName, object] = {}
@@ -278,10 +278,10 @@ class System:
     def paired(
         name: object, ports: Sequence[PortName], values: Sequence[Any]
     ) -> Iterator[tuple[PortName, Any]]:
-        """The ports of a group, each with its value.
+        """Pair the ports of a group with their values.
 
         Raises:
-            InputError: there are more of one than of the other.
+            InputError: their numbers differ.
 
         """
         if len(values) != len(ports):
@@ -290,14 +290,14 @@ class System:
 
     @staticmethod
     def is_spread(value: object) -> bool:
-        """Whether a value says what each of several components gets.
+        """Return True for a value that lists what each of several components gets.
 
         `{"each": [1, 2, 4]}` lists the values, `{"first": 1, "step": 2}` counts from the first on.
         """
         return isinstance(value, Mapping) and value.keys() in ({"each"}, {"first", "step"})
 
     def meant(self, name: PortName) -> list[PortName]:
-        """The ports or groups that a name with stars means; any other name means itself."""
+        """Return the ports or groups that match a name with stars, or else the name itself."""
         for like, port in PortName.splits(str(name)) if STAR in str(name) else ():
             starts = tuple(port + mark for mark in _MEMBER)
             found = [
@@ -311,7 +311,7 @@ class System:
         return [name]
 
     def _port_name(self, text: str) -> PortName:
-        """The name of a port; where it lacks a component, the message says which ones have it."""
+        """Read the name of a port; where it lacks a component, the error suggests some."""
         try:
             return PortName.read(text)
         except InputError as error:
@@ -321,7 +321,7 @@ class System:
             raise InputError(f"{error}{hint}") from None
 
     def members(self, text: str, causalities: Sequence[str]) -> list[PortName]:
-        """The ports of a group `component.group`, in their order; none: there is no such group."""
+        """Return the ports of a group `component.group`, in their order; none: no such group."""
         for component, group in PortName.splits(text):
             if component in self.components:
                 starts = tuple(group + mark for mark in _MEMBER)
@@ -336,10 +336,10 @@ class System:
         return []
 
     def named(self, name: PortName) -> PortName:
-        """The port that a name means, which may have dots in its component's name as well.
+        """Return the port of a name; the component's name in it may contain dots, too.
 
-        It is one of the longest component that the text begins with and that has such a port, else
-        of the one that was likely meant. With a star, it is the first of those it means.
+        The longest component that the text begins with wins, if it has such a port; else the port
+        that was likely meant. With a star, the first match is returned.
         """
         name, components, likely = self.meant(name)[0], self.components, None
         for component, port in PortName.splits(str(name)):
@@ -350,13 +350,13 @@ class System:
         return likely or likely_port(name, components)
 
     def has(self, name: PortName) -> bool:
-        """Whether there is such a port or parameter."""
+        """Return True if there is such a port or parameter."""
         target = self.named(name)
         component = self.components.get(target.component)
         return component is not None and target.port in component.variables
 
     def parameters_of(self, component: str) -> dict[str, Value]:
-        """Values that this system sets in one component, by the names of its variables."""
+        """Return the values that this system sets in a component, by names of its variables."""
         return dict(self._parameters.get(component, {}))
 
     @cached_property
@@ -367,7 +367,7 @@ class System:
         return found
 
     def changed(self, *types: str) -> dict[PortName, Value]:
-        """Parameters that differ from what their FMUs have themselves; of some types, or of all."""
+        """Return parameters that differ from their FMUs' own values; of some types, or of all."""
         return {
             name: value
             for name, value in self.parameters.items()
@@ -377,7 +377,7 @@ class System:
 
     @cached_property
     def feeding(self) -> dict[str, list[Connection]]:
-        """The connections that end at each component."""
+        """Connections that end at each component."""
         found: dict[str, list[Connection]] = {name: [] for name in self.components}
         for connection in self.connections:
             found.setdefault(connection.target.component, []).append(connection)
@@ -385,19 +385,19 @@ class System:
 
     @cached_property
     def fed(self) -> dict[str, list[Connection]]:
-        """The connections that begin at each component."""
+        """Connections that begin at each component."""
         found: dict[str, list[Connection]] = {name: [] for name in self.components}
         for connection in self.connections:
             found.setdefault(connection.source.component, []).append(connection)
         return found
 
     def fmus(self, *taken: str) -> dict[Path, str]:
-        """All FMUs, each with a file name that no other has, nor any file that is taken."""
+        """Return all FMUs, each with a unique file name that is not taken."""
         fmus = sorted({component.fmu for component in self.components.values()})
         return dict(zip(fmus, plain_file_names((fmu.name for fmu in fmus), *taken), strict=True))
 
     def open_inputs(self, component: str) -> list[str]:
-        """Inputs of one component that nothing feeds, and for which no value is set."""
+        """Return the inputs of a component that nothing feeds, and for which no value is set."""
         taken = {connection.target.port for connection in self.feeding[component]}
         taken |= self.parameters_of(component).keys()
         return [
@@ -407,7 +407,7 @@ class System:
         ]
 
     def value(self, name: PortName) -> Value | None:
-        """The value of a parameter: the one that is set, or else the component's own.
+        """Return the value of a parameter: the one that is set, or else the component's own.
 
         Raises:
             InputError: there is no such parameter.
@@ -419,7 +419,7 @@ class System:
         return self.component(target.component).start(target.port)
 
     def component(self, name: str) -> Component:
-        """One component of the system.
+        """Return one component of the system.
 
         Raises:
             InputError: there is no such component.
@@ -443,7 +443,7 @@ class System:
             raise InputError(problem)
 
     def check_order(self, order: Order | None) -> None:
-        """Check that an order that is stated names each component once.
+        """Check that a stated order names each component once.
 
         Raises:
             InputError: it does not.
@@ -464,7 +464,7 @@ class System:
                 )
 
     def problems(self) -> Iterator[str]:
-        """All that is wrong with names, connections and parameters, a line each."""
+        """Yield a line for every mistake in names, connections and parameters."""
         yield from self._ambiguous()
         fed: dict[PortName, PortName] = {}
         for connection in self.connections:
@@ -493,7 +493,7 @@ class System:
                 yield f"{target} has causality {causality} and cannot be set"
 
     def _ambiguous(self) -> Iterator[str]:
-        """Names that two ports share, when one component's name begins another's."""
+        """Yield the names that two ports share, where one component's name begins another's."""
         for name, component in self.components.items():
             for outer, rest in PortName.splits(name):
                 if outer in self.components:
@@ -503,10 +503,10 @@ class System:
                             yield f"two ports are named {name}.{port}"
 
     def rings(self, among: Collection[str] | None = None) -> list[list[str]]:
-        """Rings of direct feedthroughs: components of which each waits for all others, or itself.
+        """Return rings of direct feedthroughs: components that wait for each other or themselves.
 
         Args:
-            among: components that count; None: all.
+            among: components to look at; None: all.
 
         Returns:
             Each ring in the order in which :meth:`derived_order` opens it.
@@ -521,19 +521,20 @@ class System:
         ]
 
     def derived_order(self, solved: Sequence[Sequence[str]] = ()) -> list[str]:
-        """All components: one with direct feedthrough comes before those that it feeds.
+        """Return all components, those with direct feedthrough before those that they feed.
 
-        No order does that for every connection of a ring. The component of the ring that stands
-        first in the system then comes first, and takes one step late what feeds it; where the
-        others are a ring still, it is opened in the same way: see :meth:`delayed_connections`.
+        In a ring no order does that for every connection. Its first component in the system comes
+        first, and takes one step late what feeds it; if the others still form a ring, it is opened
+        in the same way: see :meth:`delayed_connections`.
 
         Args:
-            solved: rings that are stepped as one component each, after all that does not wait for
-                them: so they can be closed with the latest of what feeds them.
+            solved: rings that are stepped as one component each. They come after everything that
+                does not wait for them, so that they can be closed with the latest values that feed
+                them.
 
         """
         ring_of = {name: ring for ring in solved for name in ring}
-        # A ring stands where the first of its components stands.
+        # A ring stands in the place of its first component.
         place = {name: i for i, name in enumerate(self.components)}
         firsts = [(min(ring, key=place.__getitem__), ring) for ring in solved]
         lead = {name: first for first, ring in firsts for name in ring}
@@ -549,10 +550,10 @@ class System:
     def delayed_connections(
         self, order: Sequence[str], solved: Iterable[Sequence[str]] = ()
     ) -> list[Connection]:
-        """The connections with direct feedthrough that an order makes one step late.
+        """Return the connections with direct feedthrough that an order makes one step late.
 
         Args:
-            order: all its components, one stepped after the other.
+            order: all components, stepped one after the other.
             solved: rings that are stepped as one component each.
 
         """
@@ -570,7 +571,7 @@ class System:
     def in_stages(
         self, order: Sequence[str], solved: Sequence[Sequence[str]] = ()
     ) -> list[list[str]]:
-        """An order in stages: no component takes what another one of its stage has just computed.
+        """Divide an order into stages, within which no component takes what another one computes.
 
         Solved rings have their own stages, each in the place of its first component.
         """
@@ -598,7 +599,7 @@ class System:
         return stages
 
     def has_feedthrough(self, connection: Connection) -> bool:
-        """Whether the source of a connection depends on an input of the same instant."""
+        """Return True if the source of a connection depends on an input of the same instant."""
         source = connection.source
         return self.components[source.component].has_feedthrough(source.port)
 
@@ -612,11 +613,11 @@ class System:
         return found
 
     def reaching(self, component: str, until: set[str]) -> Iterator[Connection]:
-        """The connections through which values reach a component, directly or through others.
+        """Yield the connections through which values reach a component, directly or through others.
 
         Args:
             component: where the values arrive.
-            until: components that are not followed further.
+            until: components where the search ends.
 
         """
         seen, waiting = {component}, [component]
@@ -629,13 +630,13 @@ class System:
                     waiting.append(source)
 
     def unfed_inputs(self, settled: Collection[PortName] = ()) -> str | None:
-        """The inputs that nothing feeds or sets, in words, with wires that could feed them.
+        """Describe the inputs that nothing feeds or sets, with wires that could feed them.
 
         Args:
             settled: inputs that are set during a run.
 
         Returns:
-            One line; None: there is no such input.
+            One line; None: all inputs are fed or set.
 
         """
         fed = {connection.target for connection in self.connections}
@@ -659,7 +660,7 @@ class System:
                     labels += [f"{name}.{variable.name}" for variable in found]
                     continue
                 labels.append(f"{name}.{group}.*")
-                # What feeds the same inputs of another component is that one's.
+                # A source of the same inputs of another component belongs to that one.
                 sources = (
                     other
                     for other in giving.get(members[0].name, ())
@@ -676,10 +677,10 @@ class System:
         return f"nothing feeds or sets {listed(labels)}{wanted}"
 
     def decimations(self, step: float) -> dict[str, int]:
-        """How many communication steps one step of each component spans.
+        """Return the number of communication steps in one step of each component.
 
         Args:
-            step: the communication step [s].
+            step: communication step [s].
 
         Raises:
             InputError: a component's step is not a multiple of it.
@@ -701,13 +702,13 @@ class System:
         return found
 
     def with_common_step(self) -> System:
-        """The same system with the longest step of which all its components' are multiples.
+        """Return the system with the longest step that divides the steps of all components.
 
-        A component's step is the one that the system states, or else its FMU. It names none if
-        neither does.
+        A component's step is stated by the system, or else by its FMU. Without any, the system has
+        none.
 
         Raises:
-            InputError: they have none in common.
+            InputError: they have no common divisor.
 
         """
         own = {name: component.step for name, component in self.components.items()}
@@ -717,7 +718,7 @@ class System:
         return replace(self, steps=steps, step=_common_measure(steps.values()))
 
     def flattened(self) -> System:
-        """The same system for tools that know no systems in systems: `one.part` is `one_part`."""
+        """Return the system for tools without nested systems: `one.part` becomes `one_part`."""
         taken = {name for name in self.components if "." not in name}
         names = {}
         for name in self.components:
@@ -730,7 +731,7 @@ class System:
         return self.renamed(names) if names else self
 
     def renamed(self, names: Mapping[str, str]) -> System:
-        """The same system with other names for some components, which are all different."""
+        """Return the system with other, unique names for some components."""
 
         def name_of(component: str) -> str:
             return names.get(component, component)
@@ -755,13 +756,13 @@ class System:
 
 
 def _could_feed(source: Component, variable: Variable) -> bool:
-    """Whether a component has an output of the name and type of an input."""
+    """Return True if a component has an output of the name and type of an input."""
     output = source.variables.get(variable.name)
     return output is not None and output.causality == "output" and can_feed(output, variable)
 
 
 def _common_measure(steps: Iterable[float]) -> float:
-    """The longest step of which all are multiples [s]: of the numbers as they are written."""
+    """Return the longest step that divides all steps [s], which count as they are written."""
     exact = [Fraction(str(step)) for step in steps]
     denominator = lcm(*(step.denominator for step in exact))
     common = Fraction(gcd(*(int(step * denominator) for step in exact)), denominator)
@@ -775,10 +776,10 @@ def _common_measure(steps: Iterable[float]) -> float:
 
 
 def _spread(name: PortName, value: Any, n: int) -> list[Any]:
-    """The value of each of n components.
+    """Return the value of each of n components.
 
     Raises:
-        InputError: there are more or fewer of them.
+        InputError: the number of values is another one.
 
     """
     if not System.is_spread(value):
@@ -794,14 +795,14 @@ def _spread(name: PortName, value: Any, n: int) -> list[Any]:
 
 
 def _is_like(name: str, pattern: str) -> bool:
-    """Whether a component's name fits a pattern, whose stars stand for text without dots."""
-    # Only stars are wildcards here. Those of fnmatch take no time that grows with their number.
+    """Return True if a component's name matches a pattern; stars stand for text without dots."""
+    # Only stars are wildcards. fnmatch takes no longer for more of them.
     parts, patterns = name.split("."), re.sub(r"[?[]", r"[\g<0>]", pattern).split(".")
     return len(parts) == len(patterns) and all(map(fnmatchcase, parts, patterns))
 
 
 def _several(value: object) -> list[Any] | None:
-    """The values of a list, which a command line writes with commas; None: it is one value."""
+    """Split a list, which a command line writes with commas; None: it is one value."""
     if isinstance(value, str):
         return value.strip().strip("[]").split(",") if "," in value else None
     if isinstance(value, np.ndarray):

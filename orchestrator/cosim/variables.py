@@ -35,9 +35,9 @@ class Type(NamedTuple):
     """A type of FMI's variables.
 
     Attributes:
-        family: what FMI 2.0 calls this type, or the one that is its like.
+        family: this type or its equivalent in FMI 2.0.
         c_type: of its values; None: they are texts.
-        least, most: the range of its numbers.
+        least, most: range of its numbers.
 
     """
 
@@ -48,12 +48,12 @@ class Type(NamedTuple):
 
     @property
     def is_wide(self) -> bool:
-        """Whether it has integers that a double cannot hold."""
+        """True if it has integers that a double cannot hold."""
         return self.family == "Integer" and self.most > EXACT
 
     @property
     def stands(self) -> bool:
-        """Whether numbers of a row may stand for its values, and are not the values themselves."""
+        """True if numbers of a row may stand for other values."""
         return self.c_type is None or self.is_wide
 
 
@@ -86,38 +86,38 @@ TYPES = {
     "String": Type("String", None),
 }
 
-#: Up to here every integer is a double.
+#: Every integer up to this one is a double.
 EXACT = 2**53
 
-#: Numbers from the first on, so far apart, stand for integers that a double cannot hold: they
-#: are doubles themselves, and none of FMI's integers is so large.
+#: Numbers that stand for integers that a double cannot hold: the first of them and their distance.
+#: They are doubles, and larger than all of FMI's integers.
 _BEYOND, _APART = 2.0**65, 2.0**13
 
-#: An FMU may keep a value in another unit, and round it by such a share.
+#: Relative rounding of an FMU that keeps a value in another unit.
 _ROUNDING = 1e-9
 
 
 def family_of(fmi_type: str) -> str:
-    """What FMI 2.0 calls a type, or the one that is its like."""
+    """Return a type or its equivalent in FMI 2.0."""
     return TYPES[fmi_type].family if fmi_type in TYPES else fmi_type
 
 
 def same(wanted: Value, held: Value) -> bool:
-    """Whether a value is the one that was set, apart from rounding."""
+    """Return True for a value that equals the one that was set, apart from rounding."""
     if isinstance(wanted, float) and isinstance(held, float):
         return isclose(wanted, held, rel_tol=_ROUNDING)
     return wanted == held
 
 
 def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
-    """Which numbers of a row a variable of a type can hold; doubles and texts take all."""
+    """Return which numbers of a row fit a type; doubles and texts take all."""
     of = TYPES[fmi_type]
     if of.family == "Boolean":
-        # FMI 2.0 has integers for them.
+        # FMI 2.0 uses integers for them.
         of = TYPES["Integer"]
     if of.c_type in (None, ctypes.c_double):
         return np.ones(np.shape(numbers), dtype=bool)
-    # As a double, the end of 64 bits is the first number beyond it.
+    # As a double, the largest integer of 64 bits is the first number beyond the range.
     fit = of.least <= numbers
     fit &= numbers < float(of.most) if of.is_wide else numbers <= of.most
     if of.family != "Real":
@@ -128,34 +128,34 @@ def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
 
 
 def as_float32(numbers: np.ndarray) -> np.ndarray:
-    """Numbers as a Float32 holds them; those that are too large for one stay as they are."""
+    """Round numbers to Float32; those too large for it stay as they are."""
     fit = np.abs(numbers) <= TYPES["Float32"].most
     return np.where(fit, np.where(fit, numbers, 0.0).astype(np.float32), numbers)
 
 
 class StringTable:
-    """Texts by their numbers, which they keep: the first is empty, and the next one takes the next.
+    """Texts and their numbers, which stay the same; the first text is empty.
 
-    What FMUs say is not forgotten, so that a run in which one has a new text in every step takes
-    memory for all of them. Integers that a double cannot hold are kept like texts.
+    Nothing is forgotten: a run in which an FMU has a new text in every step takes memory for all of
+    them. Integers that a double cannot hold are kept like texts.
     """
 
     def __init__(self) -> None:
-        """Begin with the empty text."""
+        """Start with the empty text."""
         self.restore([""])
 
     def number(self, text: str) -> int:
-        """The number of a text, which it gets if it has none."""
+        """Return the number of a text; a new text gets the next one."""
         found = self._numbers.setdefault(text, len(self._texts))
         if found == len(self._texts):
             self._texts.append(text)
         return found
 
     def text(self, number: float) -> str:
-        """The text of a number.
+        """Return the text of a number.
 
         Raises:
-            ValueError: it has none.
+            ValueError: there is none.
 
         """
         if not 0 <= number < len(self._texts):
@@ -163,7 +163,7 @@ class StringTable:
         return self._texts[int(number)]
 
     def stand_in(self, value: Value) -> float:
-        """The number for a value in a row: itself, unless it is a text or no double can hold it."""
+        """Return the number for a value in a row: a double is itself, other values get a number."""
         if isinstance(value, str):
             return self.number(value)
         number = float(value)
@@ -172,7 +172,7 @@ class StringTable:
         return number
 
     def integer(self, number: float) -> int:
-        """The integer that a number of a row is, or stands for.
+        """Return the integer that a number of a row is or stands for.
 
         Raises:
             ValueError: it stands for none.
@@ -182,21 +182,21 @@ class StringTable:
         return int(number) if size < _BEYOND else int(self.text((size - _BEYOND) / _APART))
 
     def state(self) -> list[str]:
-        """All of them, as JSON has them."""
+        """Return all texts as JSON."""
         return list(self._texts)
 
     def restore(self, state: Iterable[str]) -> None:
-        """Take on the texts of another process, with their numbers."""
+        """Take the texts of another process, with their numbers."""
         self._texts = list(state)
         self._numbers = {text: number for number, text in enumerate(self._texts)}
 
 
 class Standing(NamedTuple):
-    """What the numbers of a column of the row stand for.
+    """The values that the numbers in a column of the row stand for.
 
     Attributes:
         fmi_type: of the values.
-        strings: that know them.
+        strings: texts and integers by their numbers.
 
     """
 
@@ -205,11 +205,11 @@ class Standing(NamedTuple):
 
     @property
     def c_type(self) -> Any:
-        """Of the values; None: they are texts."""
+        """Type of the values in C; None: they are texts."""
         return TYPES[self.fmi_type].c_type
 
     def value(self, number: float) -> str | int:
-        """The text or the integer that a number stands for.
+        """Return the text or the integer that a number stands for.
 
         Raises:
             ValueError: it stands for none.
@@ -218,7 +218,7 @@ class Standing(NamedTuple):
         return self.strings.text(number) if self.c_type is None else self.strings.integer(number)
 
     def values(self, numbers: np.ndarray) -> np.ndarray:
-        """A column in its type, from its numbers in the row.
+        """Return a column in its type, from its numbers in the row.
 
         Raises:
             ValueError: a number stands for no value.
@@ -229,16 +229,16 @@ class Standing(NamedTuple):
         return np.array(list(map(self.value, numbers.tolist())), dtype=self.c_type or str)
 
     def number(self, value: str | float) -> float:
-        """The number that stands for a value, or for the text of one."""
+        """Return the number that stands for a value, or for a text of it."""
         if self.c_type is None:
             return self.strings.number(str(value))
         return self.strings.stand_in(int(value))
 
 
-#: An array has no more elements than this: each is a column.
+#: Largest number of elements of an array, each of which is a column.
 MOST_ELEMENTS = 1_000_000
 
-#: What stands between the start values of an array of texts: no text holds it.
+#: Separates the start values of an array of texts; no text contains it.
 _BETWEEN = "\0"
 
 #: Types in words.
@@ -253,17 +253,17 @@ class Variable(NamedTuple):
     """A variable of an FMU, or one element of an array.
 
     Attributes:
-        name: its name, of an element with its indices.
-        type: its type in FMI.
+        name: for an element, with its indices.
+        type: in FMI.
         causality, variability, initial: as FMI defines them.
         reference: its value reference, which the elements of an array share.
         start, min, max, nominal: attributes of the description, as texts.
-        unit: its own, or its type's.
-        is_relative: whether it is a difference, such as one of temperatures.
-        shape: of the array that it is an element of; empty: it is a scalar.
-        items: the values of an Enumeration by their names, as the description writes them.
-        enumeration: the name of that type.
-        description: its text in the description.
+        unit: of the variable or of its type.
+        is_relative: True for a difference, such as one of temperatures.
+        shape: of the array of an element; empty: it is a scalar.
+        items: values of an Enumeration by name, as the description writes them.
+        enumeration: name of that type.
+        description: text in the FMU's description.
 
     """
 
@@ -286,7 +286,7 @@ class Variable(NamedTuple):
 
     @classmethod
     def of(cls, variable: ModelVariable) -> Variable:
-        """Take a scalar variable, or a whole array, of a description."""
+        """Make a scalar variable, or a whole array, of a description."""
         own = variable.declaredType
         choices = own is not None and family_of(variable.type) == "Enumeration"
         return cls(
@@ -310,12 +310,12 @@ class Variable(NamedTuple):
 
     @property
     def array(self) -> str:
-        """The name by which the FMU knows it: the array's, for an element."""
+        """Name in the FMU; for an element, the array's."""
         return self.name.rpartition("[")[0] if self.shape else self.name
 
     @property
     def family(self) -> str:
-        """Its type in FMI 2.0, or the one that corresponds to it there."""
+        """Type, or its equivalent in FMI 2.0."""
         return family_of(self.type)
 
     def typed(self, value: object, name: str) -> Value:
@@ -342,7 +342,7 @@ class Variable(NamedTuple):
             if self.items and not any(number == int(item) for item in self.items.values()):
                 raise ValueError(f"{number} is not an item")
         except (KeyError, ValueError):
-            # Python itself refuses to write and to read integers of very many digits.
+            # Python does not convert integers of very many digits.
             names = ", ".join(self.items)
             words = f"one of {names}" if names else _IN_WORDS.get(self.family, "an integer")
             raise InputError(f"{name}{shown}: not {words}") from None
@@ -357,14 +357,14 @@ class Variable(NamedTuple):
         return ctypes.c_float(number).value if self.type == "Float32" else number
 
     def difference(self, value: Any, name: str) -> float:
-        """Check a value that is added to the variable's own.
+        """Check a value that is to be added to the variable's own, and return it as a float.
 
         Args:
             value: a number.
             name: of the variable in the system, for messages.
 
         Raises:
-            InputError: nothing can be added to the variable, or not this value.
+            InputError: nothing can be added to the variable, or the value does not fit.
 
         """
         own = TYPES[self.type]
@@ -380,11 +380,11 @@ class Variable(NamedTuple):
         """Convert a value of a table: a number, a truth value or the name of an item.
 
         Args:
-            value: as a run or a user writes it; its range does not count.
-            where: it stands, for messages.
+            value: as a run or a user writes it; its range is not checked.
+            where: the value stands, for messages.
 
         Raises:
-            ValueError: it is neither a finite number nor another value of the type.
+            ValueError: it is neither a finite number nor a value of the type.
 
         """
         text = str(value)
@@ -397,12 +397,12 @@ class Variable(NamedTuple):
         return finite(word, where) if self.family == "Real" else whole(word, where)
 
     def shown(self, value: Any) -> Any:
-        """A value as a user writes it: an item of an Enumeration by its name."""
+        """Return a value as a user writes it: an item of an Enumeration by its name."""
         names = (name for name, number in self.items.items() if int(number) == value)
         return next(names, value)
 
     def holds(self, value: object) -> bool:
-        """Whether a value is one that the variable can have."""
+        """Return True for a value that the variable can have."""
         if isinstance(value, str):
             # Half of a UTF-16 pair is not text.
             is_text = value.encode(errors="ignore").decode() == value
@@ -415,7 +415,7 @@ class Variable(NamedTuple):
 
     @property
     def _range(self) -> tuple[float, float]:
-        """The description's range, within that of the type."""
+        """Range of the description, within that of the type."""
         own = TYPES[self.type]
         lower = own.least if self.min is None else max(own.least, _end(self.min))
         upper = own.most if self.max is None else min(own.most, _end(self.max))
@@ -423,7 +423,7 @@ class Variable(NamedTuple):
 
 
 def _end(text: str) -> float:
-    """An end of a range, exact where it is an integer."""
+    """Read an end of a range, exactly if it is an integer."""
     with suppress(ValueError):
         return integer(text)
     return real(text)
@@ -437,10 +437,10 @@ class Variables(NamedTuple):
     """The variables of an FMU.
 
     Attributes:
-        known: those that can be connected, set and recorded, by name. An element of an array is
-            one of them, with the array's shape, its neighbours in their order beside it.
-        unsupported: why others cannot, by name.
-        other_names: what to write instead of names that stand for known ones.
+        known: variables that can be connected, set and recorded, by name; elements of an array one
+            by one, in their order.
+        unsupported: reasons why other variables cannot, by name.
+        other_names: for aliases and arrays, the name to write instead.
 
     """
 
@@ -451,7 +451,7 @@ class Variables(NamedTuple):
 
 @lru_cache(maxsize=256)
 def variables_of(description: ModelDescription) -> Variables:
-    """The variables of an FMU."""
+    """Collect the variables of an FMU."""
     known: dict[str, Variable] = {}
     unsupported: dict[str, str] = {}
     other_names: dict[str, str] = {}
@@ -476,7 +476,7 @@ def variables_of(description: ModelDescription) -> Variables:
 
 
 def _reason(variable: ModelVariable) -> str:
-    """Why a variable is left alone; empty: it is not."""
+    """Return why a variable is not supported; empty: it is."""
     if variable.type not in TYPES:
         return f"is of type {variable.type}, which is not supported"
     if variable.clocks:
@@ -489,11 +489,11 @@ def _reason(variable: ModelVariable) -> str:
 
 
 def element_names(array: str, shape: Sequence[int]) -> Iterator[str]:
-    """The names of an array's elements by FMI's naming convention, in their order.
+    """Yield the names of an array's elements by FMI's naming convention, in their order.
 
     Args:
-        array: its name.
-        shape: its lengths, of which indices begin with 1; empty: it is a scalar.
+        array: name of the array.
+        shape: its lengths; indices begin with 1. Empty: it is a scalar.
 
     """
     for indices in product(*(range(1, length + 1) for length in shape)):
@@ -504,7 +504,7 @@ def _elements(array: Variable) -> Iterator[Variable]:
     n = prod(array.shape)
     starts = _starts(array)
     if len(starts) == 1:
-        # It is for all.
+        # One value holds for all elements.
         starts *= n
     for place, name in enumerate(element_names(array.name, array.shape)):
         start = starts[place] if place < len(starts) else None
@@ -518,7 +518,7 @@ def _starts(array: Variable) -> list[str]:
 
 
 def references_of(variables: Sequence[Variable]) -> list[int]:
-    """Value references of some variables, one for all elements of an array."""
+    """Return the value references of variables, one for all elements of an array."""
     found, place = [], 0
     while place < len(variables):
         found.append(variables[place].reference)
@@ -527,11 +527,11 @@ def references_of(variables: Sequence[Variable]) -> list[int]:
 
 
 def complete(description: ModelDescription, root: ElementTree.Element) -> None:
-    """Add what fmpy does not read of a description of FMI 3.0.
+    """Add the parts of a description of FMI 3.0 that fmpy does not read.
 
     Args:
-        description: as fmpy has read it.
-        root: element of the file.
+        description: as read by fmpy.
+        root: root element of the file.
 
     """
     if description.coSimulation is not None:
@@ -539,7 +539,7 @@ def complete(description: ModelDescription, root: ElementTree.Element) -> None:
         assert stated is not None
         gives = stated.get("providesDirectionalDerivatives")
         description.coSimulation.providesDirectionalDerivative = gives in ("true", "1")
-        # A capability of FMI 2.0.
+        # Only FMI 2.0 has this capability.
         description.coSimulation.canInterpolateInputs = False
     elements = {element.get("name"): element for element in root.findall("ModelVariables/*")}
     for variable in description.modelVariables:
@@ -555,18 +555,18 @@ def complete(description: ModelDescription, root: ElementTree.Element) -> None:
 
 _MEMBER = "TerminalMemberVariable"
 
-#: Matching rules of terminals: those with which all members are connected, and the other one.
+#: Matching rules of terminals: those that connect all members, and the other one.
 COMPLETE, BUS = ("plug", "sequence"), "bus"
 
 
 class Terminal(NamedTuple):
-    """Variables that are connected as one thing.
+    """Variables that are connected together.
 
     Attributes:
-        rule: which of its members are connected: all of a plug, by their names; of a bus the ones
-            that the other terminal has; all of a sequence, by their places, which are its names.
-        members: names of variables by the names of the members.
-        flows: members that are no signals: sums and signs count as well where these are joined.
+        rule: members that are connected: all of a plug, by name; those of a bus that the other
+            terminal has; all of a sequence, by place, which is their name.
+        members: names of variables by names of members.
+        flows: members that are not signals; connecting them would take sums and signs.
 
     """
 
@@ -576,7 +576,7 @@ class Terminal(NamedTuple):
 
 
 def terminals_of(folder: Path) -> dict[str, Terminal]:
-    """The terminals of an unpacked FMU by their names; one within another has a dotted name.
+    """Return the terminals of an unpacked FMU by name; an inner one has a dotted name.
 
     Raises:
         InputError: the file that lists them cannot be read.

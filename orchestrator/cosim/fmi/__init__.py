@@ -1,1 +1,1 @@
-"""An FMU as a few calls (`instance`): in this process (`loaded`) or in its own (`isolated`)."""
+"""FMUs as a few calls (`instance`): in this process (`loaded`) or in separate ones (`isolated`)."""

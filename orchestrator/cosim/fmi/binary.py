@@ -1,4 +1,4 @@
-"""The binary of an FMU for this machine: brought along, or compiled from its C sources."""
+"""The binary of an FMU for this machine: included, or compiled from its C sources."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ from orchestrator.machine.compilers import compile_library, find_compiler
 from orchestrator.machine.disk import hold_lock
 from orchestrator.machine.errors import InputError, reason
 
-#: Headers of ELF files of 32 and of 64 bits: place and form of the part about tables, and length
-#: and form of the entries for segments.
+#: ELF headers of 32 and of 64 bits: offset and format of the part about tables, length and format
+#: of the entries for segments.
 _ELF = {1: (28, "3I5H", 32, "2I8xI"), 2: (32, "2QI5H", 56, "I4xQ16xQ")}
 
-#: The kind of segments that are mapped into memory.
+#: Type of segments that are mapped into memory.
 _LOADED = 1
 
-#: As the standard of C has it: no product is contracted with a sum, nothing is reordered. No
-#: function has a prefix, whether the sources go by FMI's headers or, as 20-sim's, by their own.
+#: Standard C: no product is contracted with a sum, nothing is reordered. No function has a prefix,
+#: whether the sources use FMI's headers or, like 20-sim's, their own.
 _FLAGS = (
     "-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w",
     "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
     "-DFMI2_FUNCTION_PREFIX=",
 )  # fmt: skip
 
-#: The headers of FMI, for FMUs that come without them.
+#: FMI's headers, for FMUs without them.
 _HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 #: Category of compiled libraries in the cache.
@@ -45,19 +45,19 @@ _CATEGORY = "sources"
 
 
 def name_with_fmu(component: Component) -> str:
-    """A component and its FMU, for messages."""
+    """Name a component and its FMU, for messages."""
     return f"{component.name}: {component.fmu.name}"
 
 
 def check_place(folder: Path) -> None:
-    """Check that an unpacked FMU can be told where it is.
+    """Check that an unpacked FMU can find its folder.
 
     Raises:
         InputError: it cannot; the text says what to do.
 
     """
-    # PythonFMU 0.7 does not decode the URI of its folder, except spaces, and crashes its host. Our
-    # loader, which has PythonFMU's library beside it, does that for it.
+    # PythonFMU 0.7 decodes only spaces in the URI of its folder, and otherwise crashes its host.
+    # Our loader next to PythonFMU's library decodes the URI for it.
     loader = any(Path(folder, "binaries", fmpy.platform).glob("*_pythonfmu.*"))
     within_drive = folder.relative_to(folder.anchor).as_posix()
     if (
@@ -72,9 +72,10 @@ def check_place(folder: Path) -> None:
 
 
 def binary_of(component: Component, folder: Path) -> Path:
-    """The path of the library of an unpacked FMU for this machine, if it has one.
+    """Return the path of an unpacked FMU's library for this machine, which need not exist.
 
-    fmpy knows only the old names of platforms, which FMI 2.0.4 has for x86, and some tools for ARM.
+    fmpy uses only the old names of platforms, which FMI 2.0.4 has for x86; some tools use the new
+    ones for ARM.
     """
     identifier = component.description.coSimulation.modelIdentifier
     name = f"{identifier}{fmpy.sharedLibraryExtension}"
@@ -84,16 +85,16 @@ def binary_of(component: Component, folder: Path) -> Path:
 
 
 def _platform(component: Component) -> str:
-    """The name of the folder of this machine's libraries in the FMU's version."""
+    """Return the folder name of this machine's libraries in the FMU's version of FMI."""
     is_newest = component.description.fmiMajorVersion == 3
     return str(fmpy.platform_tuple if is_newest else fmpy.platform)
 
 
 def make_binary(component: Component, folder: Path) -> None:
-    """Compile an unpacked FMU that has sources and no library for this machine, if none is kept.
+    """Compile the library of an unpacked FMU from its sources if it has none and none is cached.
 
     Raises:
-        InputError: there is no compiler, or it refuses them.
+        InputError: there is no compiler, or it fails.
 
     """
     binary = binary_of(component, folder)
@@ -108,7 +109,7 @@ def make_binary(component: Component, folder: Path) -> None:
                 with suppress(OSError):
                     cache.write_cached(_CATEGORY, key, {binary.name: content})
         binary.parent.mkdir(parents=True, exist_ok=True)
-        # Other processes may be about to load it.
+        # Other processes may load it at the same time.
         new = binary.with_name(f"{binary.name}.{os.getpid()}")
         new.write_bytes(content)
         new.replace(binary)
@@ -118,11 +119,11 @@ def make_binary(component: Component, folder: Path) -> None:
 
 
 def check_binary(component: Component, folder: Path | None = None) -> bool:
-    """Check that an FMU has a whole library for this machine, or sources.
+    """Check that an FMU has a complete library for this machine, or sources.
 
     Args:
         component: the FMU.
-        folder: into which it is unpacked; None: the one of this process.
+        folder: of the unpacked FMU; None: the folder in this process.
 
     Returns:
         True if it has a library; False if its sources have to be compiled first.
@@ -161,9 +162,9 @@ def check_binary(component: Component, folder: Path | None = None) -> bool:
 
 
 def _is_cut_short(path: Path) -> bool:
-    """True for an ELF file that is shorter than its header says: reading the rest ends the process.
+    """Return True for a truncated ELF file: loading it would end the process.
 
-    The loaders of other systems look for themselves.
+    The loaders of other systems check it themselves.
     """
     with path.open("rb") as file:
         head = file.read(64).ljust(64, b"\0")
@@ -183,11 +184,11 @@ def _is_cut_short(path: Path) -> bool:
 
 
 class Sources(NamedTuple):
-    """Sources that are compiled.
+    """Sources of a library.
 
     Attributes:
         files: translation units.
-        options: of the compiler, for them.
+        options: of the compiler.
 
     """
 
@@ -196,14 +197,14 @@ class Sources(NamedTuple):
 
 
 def _sources_of(component: Component, folder: Path) -> Sources | None:
-    """The sources of an FMU that is unpacked into a folder; None: it has none.
+    """Return the sources of an unpacked FMU; None: it has no sources.
 
     Raises:
-        InputError: their description cannot be read, or names files that are not there.
+        InputError: their description cannot be read, or names missing files.
 
     """
     place = folder / "sources"
-    # A list may leave out where headers are.
+    # The list may lack folders of headers.
     beside = sorted({f"-idirafter{header.parent}" for header in place.rglob("*.h")})
     identifier = component.description.coSimulation.modelIdentifier
     try:
@@ -233,7 +234,7 @@ def _sources_of(component: Component, folder: Path) -> Sources | None:
 
 
 def _check_compiler(component: Component) -> None:
-    """Check that an FMU can be compiled here, if it was not before.
+    """Check that an FMU can be compiled here, or was compiled earlier.
 
     Raises:
         InputError: there is no compiler.
@@ -263,6 +264,6 @@ def _compiled(component: Component, sources: Sources) -> bytes:
 
 
 def _key(component: Component) -> str:
-    """A digest of the FMU, the flags and the kind of machine."""
+    """Return the cache key: a digest of the FMU, the compiler flags and the machine."""
     made_of = "\0".join((component.digest, *_FLAGS, sysconfig.get_platform()))
     return sha256(made_of.encode()).hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""The calls of a component in a run, and how values move between an FMU and its row."""
+"""The calls of a component in a run, and the moves of values between an FMU and its row."""
 
 from __future__ import annotations
 
@@ -34,15 +34,14 @@ from fmpy.fmi2 import (
 
 from orchestrator.cosim.variables import TYPES, StringTable, Value, are_of
 
-#: Types of the arguments of doStep in FMI 2.0, and a function of Python in its place for the
-#: compiled loop.
+#: Argument types of doStep in FMI 2.0, and a Python function that replaces it in the compiled loop.
 DO_STEP_TYPES = (fmi2Component, fmi2Real, fmi2Real, fmi2Boolean)
 DoStepCallback = CFUNCTYPE(fmi2Status, *DO_STEP_TYPES)
 
-#: A function of Python in place of one that moves values.
+#: A Python function that replaces one that moves values.
 _MoveCallback = CFUNCTYPE(fmi2Status)
 
-#: Numbers of conversions in the compiled loop, by types in C: see stepper.c.
+#: Numbers of conversions in the compiled loop by types in C: see stepper.c.
 _KINDS = {
     c_type: kind
     for kind, c_type in enumerate(
@@ -55,17 +54,17 @@ _KINDS = {
 }
 _KINDS[ctypes.c_bool] = _KINDS[ctypes.c_uint8]
 
-#: Types whose values are not all numbers of the row: Python moves these.
+#: Types whose values may need numbers that stand for them: Python moves these.
 _LOOKED_UP = (ctypes.c_int64, ctypes.c_uint64, fmi2String)
 
 
 class Moved(NamedTuple):
-    """The way in which values of a type are moved.
+    """The FMI function for values of a type.
 
     Attributes:
-        function: the one of FMI, without its prefix and Get or Set.
+        function: its name, without the prefix and Get or Set.
         c_type: of the values.
-        is_counted: whether the function is told how many values there are.
+        is_counted: True if the function takes the number of values.
 
     """
 
@@ -75,7 +74,7 @@ class Moved(NamedTuple):
 
 
 class CMove(Structure):
-    """Values of one type, neighbours in the row, and FMI's function for them: see stepper.c."""
+    """Values of one type, neighbours in the row, and their FMI function: see stepper.c."""
 
     _fields_ = (
         ("call", c_void_p),
@@ -102,7 +101,7 @@ class CStepResult(Structure):
 
 
 class CMember(Structure):
-    """A component: how it is stepped, and its inputs and outputs moved: see stepper.c."""
+    """A component with its step, its inputs and its outputs: see stepper.c."""
 
     _fields_ = (
         ("component", c_void_p),
@@ -116,10 +115,10 @@ class CMember(Structure):
 
 
 class PortBlock:
-    """Values of one type, side by side in the row of all values, moved by one FMI call.
+    """Values of one type, side by side in the row, moved by one FMI call.
 
     Attributes:
-        function: the one of FMI that moves them, without its prefix.
+        function: name of the FMI function that moves them, without its prefix.
 
     """
 
@@ -137,10 +136,10 @@ class PortBlock:
         Args:
             causality: `input` or `output`.
             fmi_type: one of :data:`.variables.TYPES`.
-            moved: how its values are moved.
+            moved: FMI function for the values.
             references: value references, one for each array.
-            row: the part of the row of all values where the values are, a view.
-            strings: know what numbers in the row stand for.
+            row: view of the values in the row.
+            strings: texts and integers that numbers in the row stand for.
 
         """
         self._is_input = causality == "input"
@@ -158,14 +157,14 @@ class PortBlock:
             # A byte of a Boolean may be neither 0 nor 1.
             of = np.uint8 if moved.c_type is ctypes.c_bool else np.dtype(moved.c_type)
             self._numbers = np.frombuffer(self._values, dtype=of)
-        # As ctypes passes them on: to convert them in every call costs a third of it.
+        # Prepared for ctypes: to convert them in every call takes a third of its time.
         count = c_size_t.from_param
         self._arguments = [byref(self._references), count(n_references), byref(self._values)]
         if moved.is_counted:
             self._arguments.append(count(n))
 
     def mover(self, function: Callable[..., int]) -> Callable[[], int]:
-        """A call that hands the values to an FMU or takes them, by its function of this block."""
+        """Return a call of an FMU's function that moves the values to or from it."""
         call = partial(function, *self._arguments)
         if self._moved.c_type is fmi2Real:
             return call
@@ -180,7 +179,7 @@ class PortBlock:
 
         def set_converted() -> int:
             numbers[:] = row
-            # Lists are compared in a third of the time. The row says which value it is.
+            # Comparing lists takes a third of the time. The check of the row names the value.
             return call() if numbers.tolist() == row.tolist() else int(fmi2Error)
 
         def set_rounded() -> int:
@@ -204,7 +203,7 @@ class PortBlock:
             row[:] = numbers
             return status
 
-        # Most components have one such output, and an array of one costs twice as much.
+        # Most components have one such output; an array of one value takes twice as long.
         return get_one if len(row) == 1 else get_converted
 
     def _set_each(self, call: Callable[[], int]) -> int:
@@ -220,7 +219,7 @@ class PortBlock:
         return self._strings.integer(number)
 
     def _get_each(self, call: Callable[[], int]) -> int:
-        # A value that an FMU leaves as it is must not be one that it gave before.
+        # A value that an FMU does not set must not be the previous one.
         ctypes.memset(self._values, 0, ctypes.sizeof(self._values))
         status = call()
         if status in (fmi2OK, fmi2Warning):
@@ -232,7 +231,7 @@ class PortBlock:
         return status
 
     def move(self, address: int | None) -> CMove:
-        """The same for the compiled loop, by the address of the FMU's function of this block."""
+        """Return the same for the compiled loop, given the address of the FMU's function."""
         return CMove(
             address,
             address_of(self._called_back),
@@ -247,38 +246,38 @@ class PortBlock:
 
 
 def address_of(function: Any) -> int | None:
-    """The address of a function of ctypes, for the compiled loop."""
+    """Return the address of a function of ctypes, for the compiled loop."""
     return cast(function, c_void_p).value
 
 
 def decode_text(string: bytes | None) -> str:
-    """Decode a text that an FMU has given; some give none where an empty one is meant."""
+    """Decode a text of an FMU; some return NULL for an empty one."""
     return (string or b"").decode(errors="replace")
 
 
 #: Calls of a component in every step, in their order.
 CALLS = SET_INPUTS, DO_STEP, GET_OUTPUTS = "setting inputs", "doStep", "getting outputs"
 
-#: Messages that are kept: an FMU may have something to say in every step.
+#: Largest number of messages that are kept, since an FMU may log in every step.
 MOST_MESSAGES = 100
 
 
 class ComponentFailed(Exception):
-    """A component failed to do what it was asked to; the text names it and says why.
+    """A component has failed; the text names it and gives the reason.
 
     Attributes:
-        fatal: whether it is lost: FMI's status fatal, or its process has ended or hangs.
+        fatal: True if it is lost: FMI's status fatal, or its process has ended or hangs.
 
     """
 
     def __init__(self, text: str, fatal: bool = False) -> None:
-        """Say what happened."""
+        """Set the text."""
         super().__init__(text)
         self.fatal = fatal
 
 
 class Ended(Exception):
-    """The run ends with the last step that was made, and well; the text says why."""
+    """A component ends the run without a failure; the text gives the reason."""
 
 
 class Part(NamedTuple):
@@ -288,7 +287,7 @@ class Part(NamedTuple):
         causality: `input` or `output`.
         fmi_type: one of :data:`.variables.TYPES`.
         references: value references, one for each array.
-        place: of their values among the component's.
+        place: of the values among the component's.
 
     """
 
@@ -299,16 +298,16 @@ class Part(NamedTuple):
 
 
 class Instance(Protocol):
-    """An instantiated FMU whose inputs and outputs live in a row of floats.
+    """An instantiated FMU whose inputs and outputs are in a row of doubles.
 
-    In every step the calls of `set_inputs`, then `do_step` with time and step size, then the calls
-    of `get_outputs` are made, the last once all components of a stage have been stepped.
-    Each returns FMI's status: `failed` is for one that is worse than a warning.
+    A step calls `set_inputs`, then `do_step` with time and step size, then `get_outputs`, the last
+    once all components of a stage have been stepped. Each call returns FMI's status; `failed` is
+    for a status worse than a warning.
 
     Attributes:
         name: of the component.
-        is_here: whether its FMU is in this process, so that there are pointers to its functions.
-        gives_derivatives: whether its FMU can say how outputs change with inputs.
+        is_here: True if its FMU is in this process, so that its functions have addresses.
+        gives_derivatives: True if its FMU provides derivatives of outputs by inputs.
 
     """
 
@@ -320,17 +319,17 @@ class Instance(Protocol):
 
     @property
     def do_exchange(self) -> Callable[[c_double, c_double, int], int] | None:
-        """The call in place of doStep where values only pass; None: there is none."""
+        """Replacement of doStep where values only pass; None: no call is needed."""
 
     @property
     def do_step(self) -> Callable[[c_double, c_double, int], int]:
-        """FMI's doStep, to be called with time, step size and one."""
+        """doStep of FMI, to be called with time, step size and one."""
 
     def pointers(self) -> CMember:
-        """The same calls as pointers, for an FMU in this process."""
+        """Return the same calls as pointers, for an FMU in this process."""
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
-        """Make the exception for a call that has ended with a status.
+        """Return the exception for a call that has ended with a status.
 
         Args:
             status: worse than a warning.
@@ -339,82 +338,83 @@ class Instance(Protocol):
         """
 
     def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
-        """Say where its values are: a view of the row, with the inputs first, and its parts.
+        """Tie the instance to its values in the row.
 
         Args:
-            values: of the row, from its first on.
-            parts: of them.
-            strings: what numbers there stand for.
+            values: view of the row from the component's first value on, inputs first.
+            parts: of the values.
+            strings: texts and integers that numbers in the row stand for.
 
         """
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode.
 
-        What may be set in that mode is set there once more: some FMUs take on their own values
-        when they enter it.
+        Values that may be set in that mode are set there again: some FMUs replace them with their
+        own when they enter it.
         """
 
     def exit_initialization(self) -> None:
-        """Get ready for the first step."""
+        """Leave initialisation mode."""
 
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
 
     def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
-        """Derivatives of some outputs with one input at the same time.
+        """Return the derivatives of some outputs by one input at the same time.
 
         Raises:
-            ComponentFailed: the FMU does not say it.
+            ComponentFailed: the FMU does not provide them.
 
         """
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
-        """Values of some variables, as the FMU holds them."""
+        """Return values of some variables, as the FMU holds them."""
 
     def tune(self, values: Mapping[str, Value]) -> None:
         """Set tunable parameters between two steps."""
 
     def reset(self) -> None:
-        """Return to the state before the initialisation, which can then be entered again."""
+        """Return to the state before the initialisation, which can then be repeated."""
 
     def keep(self) -> None:
-        """Keep the state of now, to go back to it."""
+        """Keep the present state, to go back to it."""
 
     def go_back(self) -> None:
-        """Go back to the state that was kept; what the row holds is left as it is."""
+        """Go back to the state that was kept; the row is left as it is."""
 
     def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
-        """Let some inputs, by their value references, change linearly in the steps from now on."""
+        """Let some inputs, by value reference, change linearly in all further steps."""
 
     def state(self) -> bytes:
-        """The FMU's whole state between two steps, from which another instance can go on.
+        """Return the FMU's whole state between two steps, from which another instance can continue.
 
         Raises:
-            ComponentFailed: it cannot be had; see :attr:`.component.Component.gives_state`.
+            ComponentFailed: the FMU does not provide it; see
+                :attr:`.component.Component.gives_state`.
 
         """
 
     def restore(self, state: bytes) -> None:
-        """Take on a state; what the row holds of this instance is left as it is."""
+        """Restore a state; the row is left as it is."""
 
     def terminate(self) -> None:
-        """Let the FMU finish what it has begun."""
+        """Terminate the FMU."""
 
 
 class Listener(Protocol):
-    """Something that takes messages."""
+    """Takes messages."""
 
     def take(self, status: int, text: str) -> None:
-        """Take a message with the status that it was given by FMI, and its component's name."""
+        """Take a message, which names its component, with its FMI status."""
 
 
 class Log:
     """Messages of the FMUs with status warning or worse, and remarks on the FMUs.
 
     Attributes:
-        refusals: the first of it with status discard: a value was not taken, though the call went
-            well.
+        refusals: the first messages with status discard: a value was not taken, though the call
+            went well.
 
     """
 
@@ -426,7 +426,7 @@ class Log:
         self.refusals: list[str] = []
 
     def remark(self, text: str) -> None:
-        """Note a remark on an FMU: no flood of its messages hides that."""
+        """Add a remark on an FMU, which is kept even if its messages are too many."""
         self._remarks.append(text)
 
     def take(self, status: int, text: str) -> None:
@@ -439,12 +439,12 @@ class Log:
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """All remarks, the first messages, and the number of the others."""
+        """All remarks, the first messages, and the number of further messages."""
         more = self._n - len(self._said)
         return (*self._remarks, *self._said, *([f"and {more} more messages"] * (more > 0)))
 
     def state(self) -> dict[str, Any]:
-        """The content, as JSON has it."""
+        """Return the content as JSON."""
         return {
             "remarks": self._remarks,
             "said": self._said,
@@ -453,6 +453,6 @@ class Log:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Take on what another one has taken."""
+        """Restore the content."""
         self._remarks, self.refusals = state["remarks"], state["refusals"]
         self._said, self._n = state["said"], state["n"]

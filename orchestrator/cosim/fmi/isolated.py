@@ -1,9 +1,9 @@
-"""FMUs in separate processes: what they do there ends a run at most, and nothing else.
+"""FMUs in separate processes, where a failure ends at most the run.
 
-A message between the two processes is a frame of numbers, whose size both sides know, and a note,
-which is JSON, with bytes in base64; the first number of the frame is the note's length. In a step
-there is nothing to note, so that a message is one write and one read. Numbers and JSON are all that
-is read: the process of an FMU cannot make this one run anything.
+A message between the two processes is a frame of numbers of fixed size, and a note in JSON, with
+bytes in base64; the first number of the frame is the length of the note. In a step the note is
+empty, so that a message is one write and one read. Only numbers and JSON are read: the process of
+an FMU cannot make this one execute anything.
 """
 
 from __future__ import annotations
@@ -61,29 +61,29 @@ from orchestrator.machine.errors import (
 from orchestrator.machine.interrupts import Interrupts
 from orchestrator.machine.operating_system import can_isolate, end_first_without_memory
 
-#: Limit for the start of a process [s].
+#: Time limit for the start of a process [s].
 _START = 60.0
 
-#: Interval of looks at the interrupts and at the parent, wait for an FMU after an interrupt, and
-#: time that a process has to end by itself [s].
+#: Interval of checks for interrupts and for the parent, wait for an FMU after an interrupt, and
+#: time for a process to end by itself [s].
 _GLANCE, _PATIENCE, _FAREWELL = 0.1, 1.0, 5.0
 
-#: Longest note with the state of an FMU, which may be large, and longest other note [bytes].
+#: Length limits of a note with the state of an FMU, which may be large, and of other notes [bytes].
 LONGEST_STATE, LONGEST_NOTE = 1 << 30, 1 << 25
 
-#: Longest message of an FMU [letters].
+#: Length limit of a message of an FMU [characters].
 _LONGEST_MESSAGE = 10_000
 
-#: Key of an object that stands for bytes in a note; no variable has this name.
+#: Key of an object that holds bytes in a note; no variable has this name.
 _BYTES = "\0base64"
 
-#: Statuses that a message can have.
+#: Valid statuses of a message.
 _STATUSES = range(fmi2OK, fmi2Pending + 1)
 
-#: Calls that are steps, as messages name them.
+#: Calls that are steps, as named in error messages.
 _STEP, _EXCHANGE = "doStep", "exchanging values"
 
-#: Start of a process: it finds the modules that this one would find, and has no main module.
+#: Code of a process: it finds the same modules as this one, and has no main module.
 _BEGIN = """
 import importlib, json, sys
 order = json.loads(sys.argv.pop())
@@ -91,7 +91,7 @@ sys.path[:] = order.pop("path")
 importlib.import_module("orchestrator.cosim.fmi.isolated").serve(**order)
 """
 
-#: FMUs that allow one instance per process, and have it in this one, for runs in several threads.
+#: FMUs that allow one instance per process and have it in this one, for runs in several threads.
 _taken: set[str] = set()
 _LOCK = Lock()
 
@@ -101,7 +101,8 @@ class Isolation:
     """Settings of FMUs in separate processes.
 
     Attributes:
-        step_timeout: limit of one call of an FMU [s], which may fetch a licence or read maps first.
+        step_timeout: limit for one call of an FMU [s], which may fetch a licence or read maps
+            first.
 
     """
 
@@ -109,7 +110,7 @@ class Isolation:
 
     @classmethod
     def of(cls, isolate: bool, step_timeout: float | None) -> Isolation | None:
-        """Make the settings of a user's two options.
+        """Make the settings from two options of the user.
 
         Raises:
             InputError: a timeout without isolation: a call in this process cannot be ended.
@@ -124,7 +125,7 @@ class Isolation:
         return None
 
     def __post_init__(self) -> None:
-        """Refuse a limit that is no positive number."""
+        """Refuse a limit that is not a positive number."""
         seconds = self.step_timeout
         number = isinstance(seconds, Real) and not isinstance(seconds, bool)
         if not (number and isfinite(seconds) and seconds > 0.0):
@@ -138,20 +139,20 @@ def place_instances(
     isolation: Isolation | None,
     interrupts: Interrupts,
 ) -> Iterator[dict[str, Instance]]:
-    """Place instances of components, by name: all in this process, or each in a separate one.
+    """Provide instances of components, by name: all in this process, or each in a separate one.
 
-    A further instance of an FMU that allows one per process always gets a separate process.
+    Further instances of an FMU that allows one per process always get separate processes.
 
     Args:
-        components: by their names.
+        components: by name.
         log: takes the messages of the FMUs.
-        isolation: of the FMUs; None: all are in this process.
+        isolation: settings of separate processes; None: instances are in this process.
         interrupts: end the wait for an FMU.
 
     Raises:
         InputError: an FMU cannot be loaded.
         StartError: no process can be started.
-        ComponentFailed: an FMU has failed while it was instantiated.
+        ComponentFailed: an FMU has failed in its instantiation.
 
     """
     with ExitStack() as stack:
@@ -162,7 +163,7 @@ def place_instances(
                 instances[name] = stack.enter_context(load_instance(component, log))
             else:
                 apart[name] = component
-                # Here there is time for it, and a caller to tell.
+                # Compiled here, where no time limit applies and warnings are seen.
                 make_binary(component, component.folder)
         if apart:
             settings = isolation or Isolation()
@@ -172,7 +173,7 @@ def place_instances(
 
 @contextmanager
 def _has_room(component: Component) -> Iterator[bool]:
-    """Look for room for one more instance in this process, which it then has until the end."""
+    """Reserve room for one more instance in this process, until the end."""
     if not component.is_once_per_process:
         yield True
         return
@@ -191,10 +192,10 @@ def _has_room(component: Component) -> Iterator[bool]:
 def isolate_instances(
     components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
 ) -> Iterator[dict[str, Instance]]:
-    """Place instances, each in a separate process; all end with the context.
+    """Provide instances, each in a separate process that ends with the context.
 
     Raises:
-        InputError: this system has no such processes.
+        InputError: this operating system does not support it.
         StartError: no process can be started.
 
     """
@@ -235,8 +236,8 @@ def isolate_instances(
 
 
 def _show_output(reading: int) -> None:
-    """Show what the processes write, escaped for the terminal, until all of them have ended."""
-    # A letter may come in two pieces.
+    """Show the output of the processes, escaped for the terminal, until all of them have ended."""
+    # A character may arrive in two pieces.
     decode = getincrementaldecoder("utf-8")("backslashreplace").decode
     with os.fdopen(reading, "rb", buffering=0) as output:
         while written := output.read(1 << 16):
@@ -247,15 +248,15 @@ def _show_output(reading: int) -> None:
 
 
 class _Process:
-    """The process of an FMU, in a process group of its own: what it starts ends with it."""
+    """The process of an FMU, in a process group of its own: its children end with it."""
 
     def __init__(self, component: Component, connection: int, output: int) -> None:
-        """Start it.
+        """Start the process.
 
         Args:
-            component: that it instantiates.
-            connection: descriptor of its end of the connection.
-            output: descriptor that it writes to.
+            component: to instantiate.
+            connection: descriptor of the process's end of the connection.
+            output: descriptor for its output.
 
         Raises:
             OSError: it cannot be started.
@@ -280,7 +281,7 @@ class _Process:
         )
 
     def status(self, seconds: float) -> int | None:
-        """Wait some seconds for its exit status; None: it has not ended."""
+        """Wait some seconds for its exit status; None: it is still running."""
         if self._process.returncode is None:
             with suppress(TimeoutExpired):
                 self._process.wait(seconds)
@@ -288,7 +289,7 @@ class _Process:
         return self._process.returncode
 
     def end(self) -> None:
-        """End it, and all that it has started."""
+        """End the process and its children."""
         if self.status(0.0) is None:
             self._kill_group()
             self.status(_FAREWELL)
@@ -302,7 +303,7 @@ class Channel:
     """One end of a connection.
 
     Attributes:
-        outgoing, incoming: numbers of the next message, and of the last one.
+        outgoing, incoming: numbers of the next message, and of the latest one.
 
     """
 
@@ -316,9 +317,9 @@ class Channel:
         """Use a connected socket.
 
         Args:
-            connection: its timeout, if it has one, is the interval of the calls of `waited`.
-            outgoing, incoming: number of numbers in each message.
-            waited: called with the seconds for which a message is waited for, to raise something.
+            connection: its timeout, if any, is the interval between calls of `waited`.
+            outgoing, incoming: count of numbers in each message.
+            waited: called with the seconds of the wait for a message; may raise.
 
         """
         self._connection = connection
@@ -346,7 +347,7 @@ class Channel:
         """Receive a message, and return its note.
 
         Args:
-            longest: note that may come [bytes].
+            longest: length limit of the note [bytes].
 
         Raises:
             EOFError, OSError: the other end is closed.
@@ -364,11 +365,11 @@ class Channel:
         return json.loads(text, object_hook=_from_text)
 
     def close(self) -> None:
-        """Tell the other end that nothing more follows."""
+        """Close the connection."""
         self._connection.close()
 
     def _move(self, move: Callable[[memoryview], int], data: memoryview) -> None:
-        """Send or receive all of some bytes."""
+        """Send or receive all of the bytes."""
         begun = monotonic()
         while True:
             with suppress(TimeoutError):
@@ -392,7 +393,7 @@ def _from_text(read: dict[str, Any]) -> Any:
 class IsolatedInstance:
     """An instance in another process: see :class:`.instance.Instance`.
 
-    A step is one message there, with the inputs, and one back, with the outputs.
+    A step is one message to the process, with the inputs, and one back, with the outputs.
     """
 
     is_here = False
@@ -406,7 +407,7 @@ class IsolatedInstance:
         timeout: float,
         interrupts: Interrupts,
     ) -> None:
-        """Use a process that instantiates a component now.
+        """Use a process that is about to instantiate a component.
 
         Args:
             component: of the instance.
@@ -423,26 +424,26 @@ class IsolatedInstance:
         self.get_outputs: list[Callable[[], int]] = [self._take_outputs]
         self._status, self._log = status, log
         self._timeout, self._interrupts = timeout, interrupts
-        # The call that is made now, whether it hangs, and whether it is a step.
+        # The present call, whether it hangs, and whether it is a step.
         self._call, self._hangs, self._steps = "start", False, False
         connection.settimeout(min(timeout, _GLANCE))
         incoming, outgoing = sizes(component)
         self._channel = Channel(connection, outgoing, incoming, self._waited)
 
     def wait(self) -> None:
-        """Wait for the process to begin, and to instantiate the FMU.
+        """Wait for the process to start, and to instantiate the FMU.
 
         Raises:
             InputError: the FMU cannot be instantiated.
 
         """
-        # Before it begins nothing foreign is run, and a busy machine may take its time.
+        # Nothing foreign runs before the start, which may take long on a busy machine.
         self._receive()
         self._call = "instantiate"
         self._receive()
 
     def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
-        """Say where its values are."""
+        """Tie the instance to its values in the row."""
         first = next((part.place.start for part in parts if part.causality == "output"), 0)
         self._inputs = _Ports(self._component, "input", values, strings)
         self._outputs = _Ports(self._component, "output", values[first:], strings)
@@ -452,7 +453,7 @@ class IsolatedInstance:
         self._ask("enter_initialization", values, start_time)
 
     def exit_initialization(self) -> None:
-        """Get ready for the first step."""
+        """Leave initialisation mode."""
         self._ask("exit_initialization")
 
     def exchange(self) -> None:
@@ -461,14 +462,14 @@ class IsolatedInstance:
         self._take_outputs()
 
     def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
-        """Derivatives of some outputs with one input at the same time."""
+        """Return the derivatives of some outputs by one input at the same time."""
         values = self._ask("derivatives", list(outputs), of)
         self._check(isinstance(values, list) and len(values) == len(outputs))
         self._check(all(type(value) is float for value in values))
         return list(values)
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
-        """Values of some variables, as the FMU holds them."""
+        """Return values of some variables, as the FMU holds them."""
         if not ports:
             return {}
         values = self._ask("read", list(ports))
@@ -486,7 +487,7 @@ class IsolatedInstance:
         self._ask("reset")
 
     def keep(self) -> None:
-        """Keep the state of now, to go back to it."""
+        """Keep the present state, to go back to it."""
         self._ask("keep")
 
     def go_back(self) -> None:
@@ -494,25 +495,25 @@ class IsolatedInstance:
         self._ask("go_back")
 
     def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
-        """Let some inputs change linearly in the steps from now on."""
+        """Let some inputs change linearly in all further steps."""
         self._ask("let_change", list(inputs), list(slopes))
 
     def state(self) -> bytes:
-        """The FMU's whole state between two steps."""
+        """Return the FMU's whole state between two steps."""
         state = self._ask("state")
         self._check(isinstance(state, bytes))
         return bytes(state)
 
     def restore(self, state: bytes) -> None:
-        """Take on a state."""
+        """Restore a state."""
         self._ask("restore", state)
 
     def pointers(self) -> CMember:
-        """Refuse: its calls are messages to another process."""
+        """Raise an error: its calls are messages to another process."""
         raise NotImplementedError
 
     def failed(self, status: int, function: str) -> ComponentFailed:
-        """Name a call that has ended with a status; calls of this class raise at once."""
+        """Return the exception for a status; calls of this class raise it at once."""
         return ComponentFailed(f"{self.name}: {function} ended with status {status}")
 
     def do_step(self, t: c_double, h: c_double, _: int) -> int:
@@ -520,7 +521,7 @@ class IsolatedInstance:
         return self._begin(_STEP, t.value, h.value)
 
     def do_exchange(self, t: c_double, _h: c_double, _: int) -> int:
-        """Exchange values in the same way, as in a step of no length."""
+        """Exchange values with the same message, as a step of no length."""
         return self._begin(_EXCHANGE, t.value, 0.0)
 
     def _begin(self, call: str, t: float, h: float) -> int:
@@ -530,7 +531,7 @@ class IsolatedInstance:
         return 0
 
     def terminate(self) -> None:
-        """Let the FMU finish what it has begun, free it, and end its process."""
+        """Terminate and free the FMU, and end its process."""
         try:
             self._ask("terminate")
             self.leave()
@@ -546,11 +547,11 @@ class IsolatedInstance:
             self._log.take(fmi2Warning, f"{self.name}: interrupted in {self._call}")
 
     def leave(self) -> None:
-        """Want nothing more: the process frees the FMU and ends, if it can."""
+        """Close the connection: the process then frees the FMU and ends, if it can."""
         self._channel.close()
 
     def farewell(self) -> None:
-        """Give the process some time to end; it is no use waiting for one that hangs."""
+        """Give the process some time to end, unless it hangs."""
         if not self._hangs:
             self._status(min(self._timeout, _FAREWELL))
 
@@ -562,7 +563,7 @@ class IsolatedInstance:
 
     def _ask(self, call: str, *arguments: Any) -> Any:
         if self._steps:
-            # Another component has ended the run in this step, and its outputs are not wanted.
+            # Another component has ended the run in this step, whose outputs are not needed.
             with suppress(ComponentFailed, Ended):
                 self._take_outputs()
         self._call = call
@@ -576,7 +577,7 @@ class IsolatedInstance:
             raise self._lost() from error
 
     def _receive(self) -> Any:
-        """The value in the answer to a request."""
+        """Return the value in the answer to a request."""
         longest = LONGEST_STATE if self._call == "state" else LONGEST_NOTE
         try:
             return self._read(**self._channel.receive(longest))
@@ -584,7 +585,7 @@ class IsolatedInstance:
             raise self._lost() from error
         except InputError:
             raise
-        # Whatever an FMU has made its process send.
+        # An FMU may have made its process send anything.
         except (ValueError, TypeError, AttributeError, RecursionError, MemoryError) as error:
             raise self._invalid(error) from error
 
@@ -616,7 +617,7 @@ class IsolatedInstance:
         return value
 
     def _waited(self, seconds: float) -> None:
-        # If it has ended, a process that it has started may hold the connection open.
+        # A child of a process that has ended may keep the connection open.
         self._status(0.0)
         if self._interrupts and seconds >= _PATIENCE:
             self._hangs = True
@@ -644,33 +645,33 @@ class IsolatedInstance:
 
 
 def sizes(component: Component) -> tuple[int, int]:
-    """Count the numbers in an answer of a component, its outputs, and in a request.
+    """Return the count of numbers in an answer of a component, and in a request.
 
-    A request has time, step size and inputs.
+    An answer has the outputs, a request the time, the step size and the inputs.
     """
     return len(component.having("output")), 2 + len(component.having("input"))
 
 
 class _Ports:
-    """The inputs or the outputs of a component in its row, and in messages.
+    """The inputs or the outputs of a component, in its row and in messages.
 
-    Most values are numbers. The texts and the integers that some numbers stand for go in the note.
+    Most values are numbers. Texts and integers that numbers stand for go into the note.
 
     Attributes:
-        numbers: in the row.
+        numbers: view of the values in the row.
 
     """
 
     def __init__(
         self, component: Component, causality: str, values: np.ndarray, strings: StringTable
     ) -> None:
-        """Tie them to a row.
+        """Tie the ports to a row.
 
         Args:
-            component: whose ports they are.
+            component: with the ports.
             causality: `input` or `output`.
-            values: of the row, from their first on.
-            strings: that numbers in it stand for.
+            values: view of the row from the first port on.
+            strings: texts and integers that numbers in the row stand for.
 
         """
         self._typed: list[tuple[str, slice]] = []
@@ -687,19 +688,19 @@ class _Ports:
         self.numbers = values[:n]
 
     def put(self, numbers: np.ndarray) -> dict[str, Any]:
-        """Put all into a message, and return the note."""
+        """Put the values into a message, and return its note."""
         numbers[:] = self.numbers
         values = [standing.value(numbers[i]) for i, _, standing in self._standing]
         return {"values": values} if values else {}
 
     def take(self, numbers: np.ndarray, values: Sequence[Value]) -> None:
-        """Take all from a message and from its note."""
+        """Take the values from a message and its note."""
         for (i, _, standing), value in zip(self._standing, values, strict=True):
             numbers[i] = standing.number(value)
         self.numbers[:] = numbers
 
     def check(self, numbers: np.ndarray, values: Sequence[Value]) -> None:
-        """Check what has come in a message.
+        """Check the values in a message.
 
         Raises:
             ValueError: a port cannot have its value.
@@ -731,18 +732,18 @@ def _end_in_words(status: int | None) -> str:
 
 @np.errstate(all="ignore")
 def serve(name: str, fmu: str, digest: str, folder: str, connection: int, parent: int) -> None:
-    """Instantiate an FMU, and answer requests until there are no more: all that a process does.
+    """Run a process: instantiate an FMU, and answer requests until the connection is closed.
 
     Args:
         name: of the component.
         fmu: the file, for messages.
-        digest: of it.
-        folder: into which it is unpacked.
-        connection: descriptor of the socket to the process that simulates it.
-        parent: number of that process.
+        digest: of the file.
+        folder: of the unpacked FMU.
+        connection: descriptor of the socket to the parent.
+        parent: process id of the parent.
 
     """
-    # Whether to stop is for the parent to decide.
+    # The parent decides when to stop.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     end_first_without_memory()
@@ -754,7 +755,7 @@ def serve(name: str, fmu: str, digest: str, folder: str, connection: int, parent
 
 
 def _end_with(parent: int, temporary: Path) -> None:
-    """End this process with its parent, whatever the FMU does, and remove what the parent left."""
+    """End this process with its parent in any case, and remove the parent's temporary files."""
     while os.getppid() == parent:
         sleep(_GLANCE)
     rmtree(temporary, ignore_errors=True)
@@ -764,27 +765,27 @@ def _end_with(parent: int, temporary: Path) -> None:
 class Served:
     """An FMU that answers requests.
 
-    A request without a call is a step; in one of no length, values are exchanged only. An answer
-    without a note says that all is well; else the note has messages of the FMU, the value that a
-    call has given, or why it has failed. Either has the values that numbers stand for.
+    A request without a call is a step; if its length is zero, it only exchanges values. An answer
+    without a note reports success; otherwise the note has messages of the FMU, the result of a
+    call, or the reason of its failure. Both may have values that numbers stand for.
     """
 
     def __init__(self, component: Component, channel: Channel) -> None:
-        """Answer for a component through a channel."""
+        """Serve a component through a channel."""
         self._component, self._channel = component, channel
         self._messages: list[tuple[int, str]] = []
         self._surroundings = Surroundings()
 
     def take(self, status: int, text: str) -> None:
-        """Take a message of the FMU; the log of the run would keep no more than this."""
+        """Take a message of the FMU; the log of the run keeps no more of them."""
         if status >= fmi2Warning and len(self._messages) < MOST_MESSAGES:
             self._messages.append((status, shortened(text, _LONGEST_MESSAGE)))
 
     def answer_all(self, folder: Path) -> None:
-        """Say that it begins, instantiate the FMU, and answer until the other end closes.
+        """Report the start, instantiate the FMU, and answer until the other end closes.
 
         Args:
-            folder: into which the FMU is unpacked.
+            folder: of the unpacked FMU.
 
         """
         with suppress(EOFError, OSError):
@@ -792,7 +793,7 @@ class Served:
             try:
                 with load_instance(self._component, self, folder) as instance:
                     self._begin(instance)
-                    # A call that was fatal is the last.
+                    # No call follows a fatal one.
                     going_on = self._answer(lambda: None)
                     while going_on:
                         going_on = self._answer(self._asked())
@@ -808,7 +809,7 @@ class Served:
         self._outputs = _Ports(self._component, "output", row.values[first:], row.strings)
 
     def _asked(self) -> Callable[[], Any]:
-        """The call that the next request asks for."""
+        """Return the call of the next request."""
         request = self._channel.receive()
         if "call" in request:
             return partial(getattr(self._instance, request["call"]), *request["arguments"])

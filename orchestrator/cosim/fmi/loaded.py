@@ -77,15 +77,15 @@ from orchestrator.cosim.fmi.surroundings import restore_mode, within_folder
 from orchestrator.cosim.variables import TYPES, StringTable, Value
 from orchestrator.machine.errors import InputError, reason
 
-#: Functions that FMUs must have: of FMI 2.0 all but those of a capability, of FMI 3.0 those that a
-#: run calls.
+#: Functions that FMUs must have: in FMI 2.0 all that do not depend on a capability, in FMI 3.0
+#: those that a run calls.
 _NEEDED_IN_2 = re.compile(r"(?!.*(FMUstate|Derivative|Status|CancelStep|DebugLogging)).*")
 _NEEDED_IN_3 = re.compile(
     r"fmi3(InstantiateCoSimulation|FreeInstance|EnterInitializationMode|ExitInitializationMode|"
     r"DoStep|Terminate|Reset|[GS]et((Float|U?Int)\d+|Boolean|String))"
 )
 
-#: Interval of looks at a step that goes on after its call [s].
+#: Interval at which the status of a pending step is read [s].
 _GLANCE = 1e-3
 
 
@@ -93,8 +93,8 @@ class Stepped(NamedTuple):
     """The doStep of an FMU for the compiled loop.
 
     Attributes:
-        do_step: where the function is.
-        result: into which FMI 3.0 writes how a step has ended; None: FMI 2.0 does not.
+        do_step: address of the function.
+        result: into which FMI 3.0 writes how a step has ended; None for FMI 2.0.
 
     """
 
@@ -117,11 +117,11 @@ class Hearer(Protocol):
 
 
 class _Slave:
-    """The common part of all versions.
+    """The part that all versions of FMI share.
 
     Attributes:
         prefix: of the names of functions.
-        needed: the functions that no FMU may lack.
+        needed: pattern of the functions that an FMU must have.
 
     """
 
@@ -133,7 +133,7 @@ class _Slave:
     _functions: Mapping[str, Any]
 
     def moved(self, fmi_type: str) -> Moved:
-        """The way in which values of a type are moved."""
+        """Return the FMI function for values of a type."""
         raise NotImplementedError
 
     def _loadFunctions(self) -> None:
@@ -147,7 +147,7 @@ class _Slave:
             result = super()._call(fname, *args)  # type: ignore[misc]
         finally:
             restore_mode()
-        # fmpy takes anything below FMI's statuses for success.
+        # fmpy takes a negative status for success.
         if self._functions[fname].restype is fmi2Status and result < 0:
             raise FMICallException(fname, result)
         return result
@@ -164,7 +164,7 @@ class _Slave:
             hearer: takes its messages.
 
         Raises:
-            Exception: it does not let itself be instantiated.
+            Exception: it refuses.
 
         """
         self._environment = next(_environments)
@@ -180,19 +180,19 @@ class _Slave:
 
     def free(self) -> None:
         """Free the instance; its library stays loaded."""
-        # fmpy's freeInstance would unload the library as well.
+        # fmpy's freeInstance would also unload the library.
         self._call(f"{self.prefix}FreeInstance", self.component)
         del _hearers[self._environment]
 
     def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
-        """One of the FMU's functions, for calls of every step.
+        """Return one of the FMU's functions, for calls in every step.
 
-        fmpy's own methods look the function up and convert its arguments in every call, which
-        costs as much as the call.
+        fmpy's own methods look up the function and convert its arguments in every call, which takes
+        as long as the call.
 
         Args:
             name: of the function, without its prefix.
-            types: of its arguments; None: they come as values of ctypes.
+            types: of its arguments; None: they are values of ctypes.
 
         """
         called = self.dll[f"{self.prefix}{name}"]
@@ -200,7 +200,7 @@ class _Slave:
         return partial(called, ctypes.c_void_p.from_param(self.component))
 
     def address(self, name: str) -> int | None:
-        """The address of one of the FMU's functions."""
+        """Return the address of one of the FMU's functions."""
         return address_of(self.dll[f"{self.prefix}{name}"])
 
     def set(self, fmi_type: str, references: Sequence[int], values: Sequence[Any]) -> None:
@@ -211,7 +211,7 @@ class _Slave:
         self._move(f"Set{moved.function}", references, (moved.c_type * len(values))(*values))
 
     def get(self, fmi_type: str, references: Sequence[int], n: int) -> list[Any]:
-        """So many values of one type."""
+        """Return n values of one type."""
         moved = self.moved(fmi_type)
         values = (moved.c_type * n)()
         self._move(f"Get{moved.function}", references, values)
@@ -225,23 +225,23 @@ class _Slave:
     def derivatives(
         self, unknowns: Sequence[int], knowns: Sequence[int], seed: Sequence[float], n: int
     ) -> list[float]:
-        """Derivatives of n values of some variables with others."""
+        """Return the derivatives of n values of some variables by others."""
         values: list[float] = self.getDirectionalDerivative(  # type: ignore[attr-defined]
             unknowns, knowns, seed, *self._counted(n)
         )
         return values
 
     def returned_at(self) -> float | None:
-        """The time at which it has returned from that step, which it had to make in full [s]."""
+        """Return the time of an early return from a step, which FMI does not allow here [s]."""
         return None
 
     def _counted(self, n: int) -> tuple[int, ...]:
-        """The arguments that say how many values there are."""
+        """Return the arguments for the number of values."""
         return ()
 
 
 class _Lenient:
-    """A library in which optional functions that are missing can be looked up."""
+    """A library in which missing optional functions can be looked up."""
 
     def __init__(self, dll: Any, needed: re.Pattern[str]) -> None:
         self._dll, self._needed = dll, needed
@@ -256,15 +256,15 @@ class _Lenient:
 
 
 class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
-    """An FMU of FMI 2.0 that may lack functions that its capabilities do not ask for.
+    """An FMU of FMI 2.0, which may lack functions of capabilities that it does not have.
 
-    By the beginning of the class's name fmpy knows the version.
+    fmpy reads the version from the beginning of the class's name.
     """
 
     prefix, needed = "fmi2", _NEEDED_IN_2
 
     def moved(self, fmi_type: str) -> Moved:
-        """The way in which values of a type are moved."""
+        """Return the FMI function for values of a type."""
         function = "Integer" if fmi_type == "Enumeration" else fmi_type
         c_types = {"Boolean": ctypes.c_int, "String": fmi2String}
         return Moved(function, c_types.get(fmi_type, TYPES[fmi_type].c_type))
@@ -280,16 +280,16 @@ class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
         self.enterInitializationMode()
 
     def stepping(self, component: Component) -> tuple[Callable[..., int], Stepped]:
-        """Its doStep, and the same for the compiled loop."""
+        """Return its doStep, and the same for the compiled loop."""
         if not component.description.coSimulation.canRunAsynchronuously:
             return self.function("DoStep"), Stepped(self.address("DoStep"))
-        # Called back with numbers of Python, too.
+        # The compiled loop calls it with numbers of Python.
         do_step = self._awaited(self.function("DoStep", DO_STEP_TYPES))
         self._called_back = DoStepCallback(lambda _, *step: do_step(*step))
         return do_step, Stepped(address_of(self._called_back))
 
     def _awaited(self, do_step: Callable[..., int]) -> Callable[..., int]:
-        """Steps that the FMU may go on with after the call, as calls that end when they do."""
+        """Return a step that waits until the FMU has finished, where doStep may return earlier."""
         status_of = (ctypes.c_void_p, ctypes.c_int, ctypes.POINTER(fmi2Status))
         ask = self.function("GetStatus", status_of)
 
@@ -304,18 +304,19 @@ class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
         return awaited
 
     def ended_at(self) -> float | None:
-        """The time at which it has ended the run in a step that it has discarded [s]."""
+        """Return the time at which it has ended the run in a discarded step [s]."""
         ended: bool = self.getBooleanStatus(fmi2Terminated)
         return float(self.getRealStatus(fmi2LastSuccessfulTime)) if ended else None
 
 
 class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
-    """An FMU of FMI 3.0 that may lack functions that co-simulation without events does not need."""
+    """An FMU of FMI 3.0, which may lack functions that co-simulation without events does not
+    need."""
 
     prefix, needed = "fmi3", _NEEDED_IN_3
 
     def moved(self, fmi_type: str) -> Moved:
-        """The way in which values of a type are moved."""
+        """Return the FMI function for values of a type."""
         function = "Int64" if fmi_type == "Enumeration" else fmi_type
         c_types = {"Enumeration": ctypes.c_int64, "String": fmi2String}
         return Moved(function, c_types.get(fmi_type, TYPES[fmi_type].c_type), is_counted=True)
@@ -324,7 +325,7 @@ class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
         return (n,)
 
     def _instantiate(self, environment: int) -> None:
-        """Without event mode, and without leave to return early."""
+        """Instantiate the FMU without event mode, and without early return."""
         resources = Path(self.unzipDirectory, "resources")
         self.component = self.fmi3InstantiateCoSimulation(
             self.instanceName.encode(),
@@ -348,7 +349,7 @@ class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
         self.enterInitializationMode(startTime=start_time)
 
     def stepping(self, component: Component) -> tuple[Callable[..., int], Stepped]:
-        """Its doStep, and the same for the compiled loop."""
+        """Return its doStep, and the same for the compiled loop."""
         self._result = result = CStepResult()
         called = self.function("DoStep")
         outputs = [
@@ -364,22 +365,22 @@ class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
         return do_step, Stepped(self.address("DoStep"), ctypes.pointer(result))
 
     def ended_at(self) -> float | None:
-        """The time at which it has ended the run in a step that it has discarded [s]."""
+        """Return the time at which it has ended the run in a discarded step [s]."""
         result = self._result
         return float(result.last) if result.terminate else None
 
     def returned_at(self) -> float | None:
-        """The time at which it has returned from that step, which it had to make in full [s]."""
+        """Return the time of an early return from a step, which FMI does not allow here [s]."""
         result = self._result
         return float(result.last) if result.early else None
 
 
 def slave_class(component: Component) -> type[FMU2OfOthers | FMU3OfOthers]:
-    """The functions of a component's version."""
+    """Return the class for a component's version of FMI."""
     return FMU3OfOthers if component.description.fmiMajorVersion == 3 else FMU2OfOthers
 
 
-#: Hearers of instances, by the environments that FMUs hand back with every message.
+#: Receivers of messages, by the environments that FMUs return with every message.
 _hearers: dict[int, Hearer] = {}
 _environments = count(1)
 
@@ -400,48 +401,48 @@ def _log_of_fmi3(environment: int | None, status: int, _: bytes, message: bytes 
 
 
 def _bearing(name: bytes | None) -> Hearer | None:
-    """The instance with a name: some FMUs do not hand the environment back."""
+    """Return the instance of a name: some FMUs do not return the environment."""
     text = (name or b"").decode(errors="replace")
     return next((hearer for hearer in _hearers.values() if hearer.name == text), None)
 
 
 def _callbacks() -> fmi2CallbackFunctions:
-    """Callbacks of an instance.
+    """Return the callbacks of an instance.
 
-    fmpy's proxy, which formats messages, knows one logger only: the last one that it was given. It
-    may be another one after a run of fmpy's own.
+    fmpy's proxy, which formats messages, has only one logger: the last one that was set, which may
+    be another one after a run of fmpy's own.
     """
     callbacks = fmi2CallbackFunctions()
     callbacks.logger = _log
-    # The functions of C themselves: made into callbacks of Python, they would cost an FMU that
-    # allocates in every step more than the step.
+    # Functions of C: as callbacks of Python, they would take longer than the step of an FMU that
+    # allocates memory in every step.
     callbacks.allocateMemory = ctypes.cast(fmpy.calloc, fmi2CallbackAllocateMemoryTYPE)
     callbacks.freeMemory = ctypes.cast(fmpy.free, fmi2CallbackFreeMemoryTYPE)
     addLoggerProxy(ctypes.byref(callbacks))
     return callbacks
 
 
-#: Libraries by the folders into which their FMUs are unpacked, for runs in several threads.
+#: Libraries by the folders of their unpacked FMUs, for runs in several threads.
 _libraries: dict[Path, Library] = {}
 _LOCK = Lock()
 
 
 class Library:
-    """A loaded FMU, which serves all its instances in this process.
+    """A loaded FMU with all its instances in this process.
 
     Attributes:
-        fmu: fmpy's view of it.
-        corrupted: whether one of them has ended with status fatal: FMI then forbids every further
-            call, also for the others, even to free them.
-        runs_python: whether PythonFMU has made it.
-        is_akin: whether it is made by this program or PythonFMU: nothing is left in it of an
-            instance.
-        users: how many there are.
+        fmu: object of fmpy.
+        corrupted: True if an instance has ended with status fatal: FMI then forbids all further
+            calls of all instances, even to free them.
+        runs_python: True if PythonFMU has made it.
+        is_akin: True if this program or PythonFMU has made it: nothing of an instance remains in
+            it.
+        users: number of instances.
 
     """
 
     def __init__(self, component: Component, folder: Path) -> None:
-        """Load an FMU that has been unpacked into a folder.
+        """Load an FMU from the folder into which it is unpacked.
 
         Raises:
             InputError: it cannot be loaded.
@@ -451,7 +452,7 @@ class Library:
         check_binary(component, folder)
         make_binary(component, folder)
         try:
-            # fmpy changes the current folder meanwhile, and leaves it so if it fails.
+            # fmpy changes the current folder, and does not restore it on failure.
             with within_folder(folder):
                 self.fmu = slave_class(component)(
                     guid=component.description.guid,
@@ -472,10 +473,10 @@ class Library:
 
 @contextmanager
 def library_of(component: Component, folder: Path) -> Iterator[Library]:
-    """The library of an unpacked FMU, for one more instance of it.
+    """Provide the library of an unpacked FMU for one more instance.
 
-    Many libraries hold something of the instances that they have had: each is unloaded with its
-    last one, except the ones that are known not to.
+    Many libraries keep something of their earlier instances: a library is unloaded with its last
+    instance, unless it is known to keep nothing.
 
     Raises:
         InputError: it cannot be loaded.
@@ -486,7 +487,7 @@ def library_of(component: Component, folder: Path) -> Iterator[Library]:
         if library is None:
             library = Library(component, folder)
         elif library.corrupted:
-            # It stays loaded, with all that it has in memory; under another name it is a new one.
+            # It stays loaded with its memory; a copy under another name is a new library.
             library = Library(component, _copied(folder))
         _libraries[folder] = library
         library.users += 1
@@ -507,10 +508,10 @@ def _copied(folder: Path) -> Path:
         raise InputError(f"{folder}: cannot be copied: {reason(error)}") from error
 
 
-#: FMI's categories of messages about what goes wrong (FMI 2.0.4, section 2.2.4).
+#: Categories of messages about errors (FMI 2.0.4, section 2.2.4).
 _LOGGED = {f"logStatus{status}" for status in ("Warning", "Discard", "Error", "Fatal")}
 
-#: Messages that are remembered, to say why something has failed.
+#: Largest number of messages that are kept to explain a failure.
 _MOST_COMPLAINTS = 3
 
 
@@ -524,7 +525,7 @@ class LoadedInstance:
         """Instantiate an FMU.
 
         Raises:
-            InputError: it does not let itself be instantiated.
+            InputError: it refuses.
 
         """
         self.name = component.name
@@ -545,7 +546,7 @@ class LoadedInstance:
         self._slopes: tuple[Sequence[int], Sequence[int], Sequence[float]] = ((), (), ())
         self._complaints: deque[str] = deque(maxlen=_MOST_COMPLAINTS)
         self._worst = 0
-        # The functions of the library serve all instances; only what differs is theirs.
+        # The functions of the library are shared by all instances; only the rest is copied.
         self._fmu = copy(library.fmu)
         self._fmu.instanceName = component.name
         try:
@@ -560,7 +561,7 @@ class LoadedInstance:
         self.do_step, self._stepped = self._fmu.stepping(component)
 
     def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
-        """Say where its values are."""
+        """Tie the instance to its values in the row."""
         for part in parts:
             moved = self._fmu.moved(part.fmi_type)
             row = values[part.place]
@@ -574,7 +575,7 @@ class LoadedInstance:
                 self.get_outputs.append(call)
 
     def pointers(self) -> CMember:
-        """The same calls for the compiled loop."""
+        """Return the same calls for the compiled loop."""
         inputs, outputs = (
             [block.move(self._fmu.address(block.function)) for block in blocks]
             for blocks in (self._inputs, self._outputs)
@@ -591,19 +592,19 @@ class LoadedInstance:
 
     def enter_initialization(self, values: Mapping[str, Value], start_time: float = 0.0) -> None:
         """Set start values and parameters, set up the experiment, and enter that mode."""
-        # There is nothing to be read yet.
+        # Nothing can be read yet.
         whole = self._whole(values, self._starts)
         self._set(whole)
-        # No stop time: k h ends beyond it by a rounding error, which many FMUs refuse.
+        # No stop time: k h exceeds it by a rounding error, which many FMUs refuse.
         self._call("enter_initialization", start_time)
-        # FMI has it that guesses are set only before.
+        # FMI allows guesses to be set only before.
         variables = self._variables
         self._set({port: v for port, v in whole.items() if variables[port].initial == "exact"})
 
     def exit_initialization(self) -> None:
-        """Get ready for the first step, in which no FMU is to log more than what goes wrong.
+        """Leave initialisation mode, and restrict logging to errors.
 
-        To log every step may take longer than the step. PythonFMU, which logs nothing on its own,
+        Logging every step may take longer than the step. PythonFMU does not log on its own, and
         gives the reasons of a failure no category.
         """
         self._call("exitInitializationMode")
@@ -619,7 +620,7 @@ class LoadedInstance:
         restore_mode()
 
     def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
-        """Derivatives of some outputs with one input at the same time."""
+        """Return the derivatives of some outputs by one input at the same time."""
         unknowns, knowns = self._arrays(outputs), self._arrays([of])
         seed = [float(port == of) for ports in knowns for port in ports]
         values = self._call(
@@ -630,7 +631,7 @@ class LoadedInstance:
         return [by_name[port] for port in outputs]
 
     def read(self, ports: Sequence[str]) -> dict[str, Value]:
-        """Values of some variables, as the FMU holds them."""
+        """Return values of some variables, as the FMU holds them."""
         held = {port: v for array in self._arrays(ports) for port, v in self._get(array).items()}
         return {port: held[port] for port in ports}
 
@@ -643,7 +644,7 @@ class LoadedInstance:
         self._call("reset")
 
     def keep(self) -> None:
-        """Keep the state of now, to go back to it."""
+        """Keep the present state, to go back to it."""
         self._call("fmi2GetFMUstate", self._fmu.component, ctypes.byref(self._kept))
 
     def go_back(self) -> None:
@@ -651,10 +652,10 @@ class LoadedInstance:
         self._call("setFMUState", self._kept)
 
     def let_change(self, inputs: Sequence[int], slopes: Sequence[float]) -> None:
-        """Let some inputs change linearly in the steps from now on."""
+        """Let some inputs change linearly in all further steps."""
         if inputs:
             if self._change not in self.set_inputs:
-                # After the values: an FMU may take each for a new one that does not change.
+                # Set after the values: an FMU may take a value for a new one that does not change.
                 self.set_inputs.append(self._change)
             self._slopes = inputs, [1] * len(inputs), slopes
             self._change()
@@ -664,24 +665,25 @@ class LoadedInstance:
         return int(fmi2OK)
 
     def state(self) -> bytes:
-        """The FMU's whole state between two steps."""
+        """Return the FMU's whole state between two steps."""
         with self._held("getFMUState") as state:
             serialised: bytes = self._call("serializeFMUState", state)
         return serialised
 
     def restore(self, state: bytes) -> None:
-        """Take on a state."""
+        """Restore a state."""
         self._complaints.clear()
         self._worst = 0
         with self._held("deserializeFMUState", state) as read:
             self._call("setFMUState", read)
-        # Some say only in a message that it is not theirs.
+        # Some FMUs refuse a foreign state only in a message.
         if self._worst >= fmi2Discard:
             raise ComponentFailed(self._complaints[-1])
 
     @contextmanager
     def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
-        """A state that one of fmpy's methods gives, in the FMU's memory, freed at the end."""
+        """Provide a state in the FMU's memory, made by one of fmpy's methods and freed at the
+        end."""
         if not self._gives_state:
             raise ComponentFailed(f"{self.name}: its FMU does not provide its state")
         state = self._call(method, *arguments)
@@ -692,14 +694,14 @@ class LoadedInstance:
                 self._call("freeFMUState", state)
 
     def terminate(self) -> None:
-        """Let the FMU finish what it has begun."""
+        """Terminate the FMU."""
         if not self._library.corrupted:
             self._call("terminate")
 
     def free(self) -> None:
         """Free the instance; its library stays loaded."""
         if self._library.corrupted:
-            # The memory that it was given by us must stay where it is, too.
+            # The FMU may still use memory that we have given it.
             return
         if self._kept:
             with suppress(FMICallException):
@@ -707,7 +709,7 @@ class LoadedInstance:
         self._fmu.free()
 
     def hear(self, status: int, message: str) -> None:
-        """Take a message of the FMU; the latest explains a failure, a refusal before a warning."""
+        """Take a message; the latest one explains a failure, a refusal before a warning."""
         text = f"{self.name}: {'; '.join(message.splitlines())}"
         if status >= min(self._worst, fmi2Discard):
             if self._worst < min(status, fmi2Discard):
@@ -717,7 +719,7 @@ class LoadedInstance:
         self._listener.take(status, text)
 
     def _arrays(self, ports: Iterable[str]) -> list[list[str]]:
-        """The names of some variables, each with those of all others of its array."""
+        """Return the names of some variables, each with all elements of its array."""
         arrays = self._component.arrays
         names = dict.fromkeys(self._variables[port].array for port in ports)
         return [[v.name for v in arrays[name]] if name in arrays else [name] for name in names]
@@ -728,12 +730,12 @@ class LoadedInstance:
     def _whole(
         self, values: Mapping[str, Value], others: Callable[[list[str]], Mapping[str, Value]]
     ) -> dict[str, Value]:
-        """Values with those of all other elements of their arrays, which are set as a whole."""
+        """Add the other elements of their arrays, which can only be set as a whole."""
         ports = [port for array in self._arrays(values) for port in array]
         return {**others([port for port in ports if port not in values]), **values}
 
     def _starts(self, ports: Iterable[str]) -> dict[str, Value]:
-        """The start values of some variables."""
+        """Return the start values of some variables."""
         starts = self._component.starts
         for port in ports:
             if port not in starts:
@@ -750,7 +752,7 @@ class LoadedInstance:
             self._call("set", variable.type, [variable.reference], taken)
 
     def _get(self, ports: Sequence[str]) -> dict[str, Value]:
-        """Values of a variable, or of all elements of an array."""
+        """Return values of a variable, or of all elements of an array."""
         variable = self._variables[ports[0]]
         values = self._call("get", variable.type, [variable.reference], len(ports))
         if variable.type == "String":
@@ -760,18 +762,18 @@ class LoadedInstance:
         return dict(zip(ports, values, strict=True))
 
     def _call(self, method: str, *arguments: Any, **named: Any) -> Any:
-        """One of fmpy's methods, which are slow and convenient."""
+        """Call one of fmpy's methods, which are slow but convenient."""
         try:
             return getattr(self._fmu, method)(*arguments, **named)
         except FMICallException as error:
             raise self._failed(error) from error
 
     def failed(self, status: int, function: str) -> ComponentFailed | Ended:
-        """Make the exception for a call that has ended with a status."""
+        """Return the exception for a call that has ended with a status."""
         restore_mode()
-        # First of all: what an FMU is asked now may make it complain of the question.
+        # Made first: the FMU may complain about later questions.
         failure = self._failed(FMICallException(function=function, status=status))
-        # PythonFMU says that it wants to terminate of each step that it refuses.
+        # PythonFMU reports a wish to terminate for every step that it refuses.
         if (function, status) == (DO_STEP, fmi2Discard) and not self._library.runs_python:
             with suppress(FMICallException):
                 if (time := self._fmu.ended_at()) is not None:
@@ -802,12 +804,12 @@ class LoadedInstance:
 def load_instance(
     component: Component, listener: Listener, folder: Path | None = None
 ) -> Iterator[LoadedInstance]:
-    """Load an instance of a component into this process, freed at the end.
+    """Load an instance of a component into this process, and free it at the end.
 
     Args:
         component: to instantiate.
         listener: takes its messages.
-        folder: into which its FMU is unpacked; None: this process unpacks it.
+        folder: of its unpacked FMU; None: this process unpacks it.
 
     Raises:
         InputError: the FMU cannot be loaded.

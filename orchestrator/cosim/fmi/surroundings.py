@@ -16,14 +16,14 @@ import numpy as np
 
 from orchestrator.machine.operating_system import floating_point_calls
 
-#: Factors whose product passes through the smallest numbers, and is rounded up and down: with
-#: another mode it is another one.
+#: Factors whose product passes through subnormal numbers and is rounded up and down: it differs in
+#: any other mode.
 A, B, C, PRODUCT = 1e-308, 0.1, 1e300, 1.000000000000002e-09
 
-#: More bytes than any machine needs for its mode.
+#: Upper limit for the size of the mode [bytes].
 _SIZE = 1024
 
-#: Modules that FMUs in Python share with this program; what they add to them is theirs.
+#: Modules that FMUs in Python share with this program; they may add names to them.
 _MODULES = (builtins, json, os, np)
 
 
@@ -31,9 +31,9 @@ _take_default, _get, _set = floating_point_calls()
 
 
 def restore_mode() -> None:
-    """Take on the default mode after a call of an FMU, if numbers are others in the present one.
+    """Restore the default mode after a call of an FMU, if the present mode computes differently.
 
-    Looking costs a third of changing it.
+    Testing takes a third of the time of setting it.
     """
     if A * B * C != PRODUCT:
         _take_default()
@@ -41,7 +41,7 @@ def restore_mode() -> None:
 
 @contextmanager
 def default_mode() -> Iterator[None]:
-    """Compute in the default mode, and restore the one that was there."""
+    """Compute in the default mode, and restore the previous one at the end."""
     before = ctypes.create_string_buffer(_SIZE)
     _get(before)
     _take_default()
@@ -52,27 +52,27 @@ def default_mode() -> Iterator[None]:
 
 
 class Surroundings:
-    """The current folder, the standard streams, and what modules hold.
+    """The current folder, the standard streams, and the contents of some modules.
 
-    FMUs may change them during a run, and find them as they left them, so that
-    nothing depends on when this program looks after its files.
+    FMUs may change them during a run, and find them as they left them, so that nothing depends on
+    the moments at which this program uses its files.
     """
 
     def __init__(self) -> None:
-        """Remember what is there before an FMU is loaded."""
+        """Save the present state, before an FMU is loaded."""
         self._process = os.getpid()
-        # Another thread than the main one shares it all with others, which may change it, too.
+        # A thread other than the main one shares all of this with threads that may change it.
         self._is_ours = threading.current_thread() is threading.main_thread()
         self._modules = [(vars(module), dict(vars(module))) for module in _MODULES]
         self._streams = sys.stdin, sys.stdout, sys.stderr
         self._folder, self._status = Path(), os.stat(".")  # noqa: PTH116  # a third of the time
-        # It may have been deleted: then there is nothing to go back to.
+        # A deleted folder cannot be restored.
         with suppress(OSError):
             self._folder = Path.cwd()
 
     @contextmanager
     def ours(self) -> Iterator[None]:
-        """For a while, have streams and folder as they were; never in a copy of the process."""
+        """Restore streams and folder temporarily; a forked copy of the process ends here."""
         self.end_copy()
         if not self._is_ours:
             yield
@@ -88,7 +88,7 @@ class Surroundings:
                     os.chdir(folder)
 
     def put_back(self) -> None:
-        """Put all back as it was; never in a copy of the process."""
+        """Restore everything; a forked copy of the process ends here."""
         self.end_copy()
         if self._is_ours:
             for now, before in self._modules:
@@ -96,17 +96,17 @@ class Surroundings:
             self._left()
             sys.stdin, sys.stdout, sys.stderr = self._streams
             for number, name in enumerate(("stdin", "stdout", "stderr")):
-                # Closed in Python, where the descriptor stays open.
+                # Closed in Python; the descriptor is still open.
                 if getattr(getattr(sys, name), "closed", False):
                     setattr(sys, name, open(number, "w" if number else "r", closefd=False))  # noqa: SIM115
 
     def end_copy(self) -> None:
-        """End a copy that an FMU has made of this process: two would write into the same files."""
+        """End a copy that an FMU has forked: both would write into the same files."""
         if os.getpid() != self._process:
             os._exit(0)
 
     def _left(self) -> Path | None:
-        """Go back to the folder of before; gives the one that is left, if it is another."""
+        """Return to the saved folder, and return the folder that is left, if it differs."""
         with suppress(OSError):
             if not os.path.samestat(os.stat("."), self._status):  # noqa: PTH116
                 folder = Path.cwd()
@@ -115,17 +115,17 @@ class Surroundings:
         return None
 
     def __enter__(self) -> Surroundings:
-        """Let FMUs begin."""
+        """Let FMUs start."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Put back what they have changed."""
+        """Restore the process."""
         self.put_back()
 
 
 @contextmanager
 def within_folder(folder: Path) -> Iterator[None]:
-    """Make a folder the current one for a while; the one before may have been deleted."""
+    """Change the current folder temporarily; the previous one may have been deleted."""
     if not hasattr(os, "fchdir"):
         with chdir(folder):
             yield
