@@ -292,7 +292,7 @@ class Component:
         return [v for v in self.variables.values() if v.causality == causality]
 
     def start(self, name: str) -> Value | None:
-        """Return the start value of a variable, in its type; None: the description has none.
+        """Return the start value of a variable, in its type, if the description has one.
 
         Raises:
             InputError: there is no such variable.
@@ -309,7 +309,7 @@ class Component:
         return _starts_of(self.description)
 
     def experiment(self, name: str) -> float | None:
-        """Return a number of its DefaultExperiment, such as `stopTime` [s]; None: it has none."""
+        """Return a number of its DefaultExperiment, such as `stopTime` [s], or None."""
         stated = getattr(self.description.defaultExperiment, name, None)
         with suppress(ValueError):
             return None if stated is None else finite(stated, name)
@@ -317,7 +317,7 @@ class Component:
 
     @property
     def step(self) -> float | None:
-        """Step that the FMU was made for [s]; None: the description has none."""
+        """Step of the description [s], or None."""
         step = self.experiment("stepSize")
         return step if step is not None and step > 0.0 else None
 
@@ -350,7 +350,7 @@ class Component:
         return _feedthrough_of(self.description)
 
 
-# Shared by all components of an FMU, of which there may be thousands.
+# Cached: thousands of components may share an FMU.
 
 
 @lru_cache(maxsize=256)

@@ -169,7 +169,7 @@ def defined(component: Component, name: str) -> Unit:
 
 
 def unit_of_port(component: Component, port: str, otherwise: Units | None = None) -> Unit | None:
-    """Return the unit of a variable; None: it has none.
+    """Return the unit of a variable, or None.
 
     Args:
         component: with the variable.

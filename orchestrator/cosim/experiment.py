@@ -147,7 +147,7 @@ class Experiment:
 
     @property
     def acting_row(self) -> int:
-        """Row that shows what acts in a step: that of its beginning (0), or of its end (1).
+        """Row with the values that act in a step: at its beginning (0) or at its end (1).
 
         All inputs act, and the outputs that follow from inputs of the same time. In feedthrough
         order they pass before the row shows them; in other orders the step computes them.

@@ -405,7 +405,7 @@ class Table:
         n = header.experiment.rows
         if n > MOST_ROWS:
             raise InputError(f"{n:,} rows do not fit into memory; take larger steps")
-        # Memory is used when a row is written, so that a long run costs only what it has computed.
+        # Memory is used when a row is written: a run takes no more than its computed rows.
         try:
             self._enter(header, np.empty((n, 1 + len(header.columns))))
         except MemoryError as error:
@@ -502,7 +502,7 @@ class Table:
         return slice(first, self._n - 1 + first)
 
     def step_values(self, *columns: str) -> np.ndarray:
-        """Return values that act in steps, or follow from inputs of their beginning: a row a step."""
+        """Return values that act in steps, or follow from inputs of their beginning."""
         return self.group(*columns)[self.acting]
 
     def start_values(self, *columns: str) -> np.ndarray:

@@ -23,8 +23,8 @@ from orchestrator.cosim.variables import Variable
 from orchestrator.machine.errors import shortened
 from orchestrator.machine.texts import real
 
-#: Tolerance, relative and absolute, within which a ring is at rest; iteration goes on down to
-#: rounding.
+#: Tolerances, relative and absolute: a ring is at rest within the first; iteration stops at the
+#: second.
 _REST, _ROUNDING = (1e-10, 1e-12), (1e-14, 1e-14)
 
 #: Limits for the rounds of discrete values, the steps of Newton's method, and the halvings of a

@@ -10,7 +10,7 @@ no order is stated. Inputs are gathered before a stage is stepped; outputs are r
 - `gauss-seidel`: a component whose output has direct feedthrough is stepped in an earlier
   stage than those it feeds, so they receive without delay what follows from t_k. Outputs
   without feedthrough are states: all take them at t_k.
-- the names of all components: the same in the order that they stand in.
+- the names of all components: the same, in this order.
 
 A ring of feedthroughs that is not solved is opened before its first component in the system, which
 takes what feeds it at t_k.
@@ -376,8 +376,8 @@ def _passing_first(
         for one in system.connections
         if place[one.source.component] >= place[one.target.component]
     }
-    # What takes an output with direct feedthrough before it passes, takes the one that follows from
-    # the inputs of this step.
+    # A component that takes an output with direct feedthrough before it passes must get the one that
+    # follows from the inputs of this step.
     late = {one.source.component for one in arrangement.late}
 
     def stepped(name: str) -> Visit:

@@ -1,7 +1,7 @@
-/* The loop of a run, compiled: loop.py calls it, and says the same in Python.
+/* The compiled loop of a run: loop.py calls it, and has the same loop in Python.
  *
- * It makes one step after the other through the FMUs' own functions, and a row after each, until
- * Python has to look: the block of rows is full, it is time to, or a step has gone wrong.
+ * It makes steps through the FMUs' own functions, and a row for each, until Python has to act: the
+ * block of rows is full, hooks are due, or a step has failed.
  */
 #ifdef _WIN32
 #include <windows.h>
@@ -23,10 +23,10 @@
 /* The worst of FMI's statuses that is not a failure, and two that are. */
 enum { FMI_WARNING = 1, FMI_DISCARD = 2, FMI_ERROR = 3 };
 
-/* Steps of which so many take no time to speak of are timed so many together. */
+/* If this many steps take no measurable time, the clock is read only after a few of them. */
 enum { MANY = 1024, FEW = 8 };
 
-/* Partial sums that processors add side by side. */
+/* Partial sums that processors compute in parallel. */
 enum { LANES = 4 };
 
 typedef unsigned reference;
@@ -40,23 +40,23 @@ typedef union {
 /* Values of one type that are neighbours in the row. */
 typedef struct {
     mover call;
-    int (*python)(void); /* the same for values that are not numbers of the row */
+    int (*python)(void); /* used for values that the row holds as stand-ins */
     const reference *references;
     size_t n_references, n;
-    double *row;  /* their place in the row */
-    void *values; /* as the FMU has them: doubles are the row itself */
+    double *row;  /* address of the first one in the row */
+    void *values; /* in the type of the FMU; doubles are in the row itself */
     enum {
         IN_PLACE, OF_FLOAT32, OF_INT8, OF_UINT8, OF_INT16, OF_UINT16, OF_INT32, OF_UINT32,
         OF_INT64, OF_UINT64, BY_PYTHON
     } kind;
-    int is_counted; /* whether the function is told how many values there are, as in FMI 3.0 */
+    int is_counted; /* true if the function takes the number of values, as in FMI 3.0 */
 } move;
 
-/* What doStep of FMI 3.0 tells. */
+/* Results of doStep of FMI 3.0. */
 typedef struct {
     bool event, terminate, early;
     double last;
-} told_by_step;
+} step_result;
 
 typedef struct {
     void *component;
@@ -65,12 +65,12 @@ typedef struct {
         int (*fmi3)(void *component, double t, double h, bool no_rollback, bool *event,
                     bool *terminate, bool *early, double *last);
     } do_step;
-    told_by_step *told; /* NULL: it is FMI 2.0 */
+    step_result *result; /* NULL for FMI 2.0 */
     const move *inputs, *outputs;
     size_t n_inputs, n_outputs;
 } member;
 
-/* Values that become others on their way through one connection; others stay what they are. */
+/* Values that a connection maps to others; unlisted values stay as they are. */
 typedef struct {
     size_t connection, n;
     const double *from, *to;
@@ -83,36 +83,36 @@ typedef struct {
     const mapping *mappings;
     const member *members;
     size_t n_connections, n_mappings, n_members;
-    size_t every; /* how many steps one step of its components spans */
-    int at_end;   /* whether it belongs to the last of these steps, not to the first */
+    size_t every; /* number of communication steps in one step of its components */
+    int at_end;   /* true for the last of these steps, false for the first */
 } stage;
 
 typedef struct {
     const stage *stages;
-    double *values; /* the row of all values: first the ones that are shown, then the hidden */
+    double *values; /* the row of all values: first the shown ones, then the hidden ones */
     size_t n_stages;
-    size_t shown_after; /* so many of the stages: a row shows what values have passed in them, and
-                           all others follow; if it is all of them, it shows the end of the step */
+    size_t shown_after; /* number of stages before the row is shown; if it is all of them, the row
+                           shows the end of the step */
     size_t n_shown;
     double start_time, step, stop_time;
-    size_t full_steps, steps; /* if there is one more of all steps, it is shorter */
+    size_t full_steps, steps; /* if `steps` is greater, the last step is shorter */
 } run;
 
-/* Rows, each with the time in front; Python reads their number meanwhile. */
+/* Rows, each with the time in front; Python reads their number between calls. */
 typedef struct {
     double *rows;
     size_t most, n;
 } block;
 
-/* The first call with a status that is worse than a warning. */
+/* The first call with a status worse than a warning. */
 typedef struct {
     size_t stage, member;
     enum { SET_INPUTS, DO_STEP, GET_OUTPUTS } call;
     int status;
 } failure;
 
-/* Take on the default floating-point mode after calls of an FMU: see fmi/surroundings.py.
- * Whether it was another one, as far as that can be told. */
+/* Restore the default floating-point mode after calls of an FMU: see fmi/surroundings.py. Return
+ * true if the mode was another one; where that cannot be told, return false. */
 #ifdef __x86_64__
 enum { CAN_TELL = 1 };
 static inline int put_back(void) {
@@ -134,10 +134,10 @@ static inline int put_back(void) {
 }
 #endif
 
-/* Why Python has to look. */
+/* Reasons to return. */
 enum { DUE, FAILED, NOT_FINITE };
 
-/* Seconds since some moment, whatever happens to the date. */
+/* Return a monotonic time in seconds. */
 static double now(void) {
 #ifdef _WIN32
     return 1e-3 * (double)GetTickCount64();
@@ -155,10 +155,10 @@ static int call(const move *it, void *component) {
     return it->call.fmi2(component, it->references, it->n_references, it->values);
 }
 
-/* All integers below it are doubles, and numbers of the row. */
+/* All integers below are doubles, and stand for themselves in the row. */
 static const double EXACT = 9007199254740992.0;
 
-/* The check of the row names values that a type cannot hold. */
+/* The check of the row reports values that do not fit a type. */
 #define SET(kind, type, fits, otherwise)                                                         \
     case kind:                                                                                   \
         for (i = 0; i < it->n; i++) {                                                            \
@@ -223,7 +223,7 @@ static int get_converted(const move *it, void *component) {
     return status;
 }
 
-/* What most values are costs no look at the others. */
+/* The most frequent case is tested first. */
 static int set(const move *it, void *component) {
     return it->kind == IN_PLACE ? call(it, component) : set_converted(it, component);
 }
@@ -232,10 +232,11 @@ static int get(const move *it, void *component) {
     return it->kind == IN_PLACE ? call(it, component) : get_converted(it, component);
 }
 
-/* Whether a status is worse than a warning, or none of FMI's. */
+/* Return true for a status that is worse than a warning, or not one of FMI's. */
 static int is_bad(int status) { return (unsigned)status > FMI_WARNING; }
 
-/* Read the outputs of a stage, with care for the mode after each component; whether one failed. */
+/* Read the outputs of a stage, restoring the mode after each component if `careful`; return true if
+ * one failed. */
 static int outputs_failed(const stage *this, int careful, failure *why) {
     size_t i, j;
     for (i = 0; i < this->n_members; i++) {
@@ -249,19 +250,19 @@ static int outputs_failed(const stage *this, int careful, failure *why) {
     return 0;
 }
 
-/* Values only pass through a component that has no such function. */
+/* Step a component; values only pass through one without this function. */
 static int do_step(const member *it, double t, double h) {
-    told_by_step *told = it->told;
+    step_result *result = it->result;
     int status;
     if (it->do_step.fmi2 == NULL) return 0;
-    if (told == NULL) return it->do_step.fmi2(it->component, t, h, 1);
-    status = it->do_step.fmi3(it->component, t, h, true, &told->event, &told->terminate,
-                              &told->early, &told->last);
-    /* Python sees what it means. */
-    return !is_bad(status) && (told->terminate || told->early) ? FMI_DISCARD : status;
+    if (result == NULL) return it->do_step.fmi2(it->component, t, h, 1);
+    status = it->do_step.fmi3(it->component, t, h, true, &result->event, &result->terminate,
+                              &result->early, &result->last);
+    /* Python interprets it. */
+    return !is_bad(status) && (result->terminate || result->early) ? FMI_DISCARD : status;
 }
 
-/* Step the components of a stage; whether one of them failed. */
+/* Step the components of a stage; return true if one of them failed. */
 static int stage_failed(const stage *this, double t, double h, failure *why) {
     size_t i, j;
     for (i = 0; i < this->n_members; i++) {
@@ -277,7 +278,7 @@ static int stage_failed(const stage *this, double t, double h, failure *why) {
     }
     why->call = GET_OUTPUTS;
     if (outputs_failed(this, !CAN_TELL, why)) return 1;
-    /* One that is read after another has changed the mode is read again. */
+    /* Outputs that were read in a changed mode are read again. */
     return put_back() && this->n_members > 1 && outputs_failed(this, 1, why);
 }
 
@@ -289,7 +290,7 @@ static double mapped(const mapping *this, double value) {
     return value;
 }
 
-/* No target is a source of the same stage, so what is mapped can be moved again. */
+/* No target is a source of the same stage, so that mapped values can be moved a second time. */
 static void gather(const stage *this, double values[]) {
     const size_t *to = this->targets, *from = this->sources;
     size_t i, j;
@@ -303,7 +304,7 @@ static void gather(const stage *this, double values[]) {
     }
 }
 
-/* Whether the components of a stage are stepped, or what they have computed is shown. */
+/* Return true in the steps in which the components of a stage are stepped or shown. */
 static int is_due(const stage *this, size_t k, size_t steps) {
     if (this->at_end) return (k + 1) % this->every == 0 || k + 1 == steps;
     return k % this->every == 0;
@@ -313,14 +314,14 @@ static double time_after(const run *this, size_t k) {
     return k <= this->full_steps ? this->start_time + (double)k * this->step : this->stop_time;
 }
 
-/* How long n steps after the k-th last, or as many of them as are left. */
+/* Return the length of the n steps after the k-th, or of as many as are left. */
 static double length_of(const run *this, size_t k, size_t n) {
     if (k + n <= this->full_steps) return (double)n * this->step;
     if (this->steps > this->full_steps) return this->stop_time - time_after(this, k);
     return (double)(this->full_steps - k) * this->step;
 }
 
-/* Make some stages of the step after the k-th; whether a component failed. */
+/* Make some stages of the step after the k-th; return true if a component failed. */
 static int stages_failed(const run *this, size_t first, size_t end, size_t k, failure *why) {
     const double t = time_after(this, k), h = length_of(this, k, 1);
     for (why->stage = first; why->stage < end; why->stage++) {
@@ -333,7 +334,7 @@ static int stages_failed(const run *this, size_t first, size_t end, size_t k, fa
     return 0;
 }
 
-/* Times zero, what is finite is zero and what is not is NaN. */
+/* Zero times a finite number is zero, otherwise NaN. */
 static int all_finite(const double values[], size_t n) {
     double sums[LANES] = {0.0}, sum = 0.0;
     size_t i, j;
@@ -345,13 +346,13 @@ static int all_finite(const double values[], size_t n) {
     return sum == 0.0;
 }
 
-/* Make the steps that are left until so many are made, and count them. */
+/* Make steps until their number is `until`, and count them. */
 EXPORTED int advance(const run *this, size_t *made, size_t until, double patience, block *rows,
                      failure *why) {
     const int shown_at_end = this->shown_after == this->n_stages;
     const double due = now() + patience;
     double last = due - patience;
-    int unasked = 1; /* steps until the clock is asked again, which takes as long as an FMI call */
+    int unasked = 1; /* steps until the clock is read again, which takes as long as an FMI call */
     while (*made < until && rows->n < rows->most) {
         double *row = rows->rows + rows->n * (1 + this->n_shown);
         if (stages_failed(this, 0, this->shown_after, *made, why)) {

@@ -534,7 +534,7 @@ class System:
 
         """
         ring_of = {name: ring for ring in solved for name in ring}
-        # A ring stands in the place of its first component.
+        # A ring has the place of its first component.
         place = {name: i for i, name in enumerate(self.components)}
         firsts = [(min(ring, key=place.__getitem__), ring) for ring in solved]
         lead = {name: first for first, ring in firsts for name in ring}

@@ -342,7 +342,7 @@ class Variable(NamedTuple):
             if self.items and not any(number == int(item) for item in self.items.values()):
                 raise ValueError(f"{number} is not an item")
         except (KeyError, ValueError):
-            # Python does not convert integers of very many digits.
+            # Python does not convert integers with thousands of digits.
             names = ", ".join(self.items)
             words = f"one of {names}" if names else _IN_WORDS.get(self.family, "an integer")
             raise InputError(f"{name}{shown}: not {words}") from None
@@ -357,7 +357,7 @@ class Variable(NamedTuple):
         return ctypes.c_float(number).value if self.type == "Float32" else number
 
     def difference(self, value: Any, name: str) -> float:
-        """Check a value that is to be added to the variable's own, and return it as a float.
+        """Return a value that can be added to the variable's own.
 
         Args:
             value: a number.
@@ -415,7 +415,7 @@ class Variable(NamedTuple):
 
     @property
     def _range(self) -> tuple[float, float]:
-        """Range of the description, within that of the type."""
+        """Range of the description, limited by the type."""
         own = TYPES[self.type]
         lower = own.least if self.min is None else max(own.least, _end(self.min))
         upper = own.most if self.max is None else min(own.most, _end(self.max))

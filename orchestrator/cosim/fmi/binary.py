@@ -91,7 +91,7 @@ def _platform(component: Component) -> str:
 
 
 def make_binary(component: Component, folder: Path) -> None:
-    """Compile the library of an unpacked FMU from its sources if it has none and none is cached.
+    """Compile the missing library of an unpacked FMU from its sources, unless it is cached.
 
     Raises:
         InputError: there is no compiler, or it fails.

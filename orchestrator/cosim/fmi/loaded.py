@@ -77,8 +77,8 @@ from orchestrator.cosim.fmi.surroundings import restore_mode, within_folder
 from orchestrator.cosim.variables import TYPES, StringTable, Value
 from orchestrator.machine.errors import InputError, reason
 
-#: Functions that FMUs must have: in FMI 2.0 all that do not depend on a capability, in FMI 3.0
-#: those that a run calls.
+#: Functions that FMUs must have: those of FMI 2.0 without a capability, and those of FMI 3.0 in a
+#: run.
 _NEEDED_IN_2 = re.compile(r"(?!.*(FMUstate|Derivative|Status|CancelStep|DebugLogging)).*")
 _NEEDED_IN_3 = re.compile(
     r"fmi3(InstantiateCoSimulation|FreeInstance|EnterInitializationMode|ExitInitializationMode|"
@@ -310,8 +310,7 @@ class FMU2OfOthers(_Slave, FMU2Slave):  # type: ignore[misc]
 
 
 class FMU3OfOthers(_Slave, FMU3Slave):  # type: ignore[misc]
-    """An FMU of FMI 3.0, which may lack functions that co-simulation without events does not
-    need."""
+    """An FMU of FMI 3.0, which may lack functions for events."""
 
     prefix, needed = "fmi3", _NEEDED_IN_3
 
@@ -682,8 +681,7 @@ class LoadedInstance:
 
     @contextmanager
     def _held(self, method: str, *arguments: Any) -> Iterator[Any]:
-        """Provide a state in the FMU's memory, made by one of fmpy's methods and freed at the
-        end."""
+        """Provide a state in the FMU's memory, made by a method of fmpy and freed at the end."""
         if not self._gives_state:
             raise ComponentFailed(f"{self.name}: its FMU does not provide its state")
         state = self._call(method, *arguments)

@@ -1,7 +1,7 @@
-"""An SSP archive or its folder while it is read: its files, and the flaws found in it.
+"""An SSP archive or its folder while it is read: its files, and their flaws.
 
-Files are read leniently, and checked with the schemas: harmless flaws are notes. fmpy.ssp reads
-a file only if it is valid to the letter, and does not decode the addresses of files.
+Files are read leniently and checked with the schemas: harmless flaws are notes. fmpy.ssp reads only
+files that are perfectly valid, and does not decode the addresses of files.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from orchestrator.machine.errors import Findings, InputError, did_you_mean, list
 from orchestrator.machine.texts import finite, integer
 from orchestrator.machine.user_files import check_file, is_folder, unpack
 
-#: The file of an archive that describes its contents.
+#: The file of an archive that describes the system.
 STRUCTURE = "SystemStructure.ssd"
 
 _SSP = "http://ssp-standard.org/SSP1/SystemStructure"
@@ -36,33 +36,33 @@ SSB = f"{_SSP}SignalDictionary"
 OSP = "http://opensimulationplatform.com/SSP/OSPAnnotations"
 OMS = "https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd"
 
-#: The annotation of ours that names the inputs that are open on purpose.
+#: Our annotation that names the inputs that are open on purpose.
 LEFT_OPEN = "LeftOpen"
 
-#: The one that names the components in their order, where nesting changes it.
+#: Our annotation that names the components in order, where nesting changes it.
 ORDER = "Order"
 
-#: Namespaces of the standard's own elements.
+#: Namespaces of SSP's elements.
 NAMESPACES = (SSD, SSC, SSV, SSM, SSB)
 
 
-#: The versions of SSP that are read, the last one also where a file names another.
+#: Supported versions of SSP; other versions are read as the last one.
 VERSIONS = ("1.0", "2.0")
 
-#: Schemas by the root elements of the files that they are for.
+#: Schemas by root elements.
 _SCHEMAS = {
     "SystemStructureDescription": "SystemStructureDescription.xsd",
     "ParameterSet": "SystemStructureParameterValues.xsd",
     "ParameterMapping": "SystemStructureParameterMapping.xsd",
 }
 
-#: Elements that are new in 2.0, with all that is in them.
+#: Elements that are new in 2.0; they are left out with their contents.
 _ELEMENTS = ("Clock", "Dimension", "MetaData", "Signature", "Value")
 
 #: Attributes that are new in 2.0.
 _ATTRIBUTES = ("endIndices", "startIndices", "systemInnerX", "systemInnerY")
 
-#: Values of attributes that are new in 2.0, and what stands for each in 1.0.
+#: Values of attributes that are new in 2.0, and their replacements in 1.0.
 _VALUES = {
     ("implementation", "ScheduledExecution"): "any",
     **{
@@ -71,15 +71,15 @@ _VALUES = {
     },
 }
 
-#: Types whose values may have spaces in them.
+#: Types whose values may contain spaces.
 _TEXTS = ("String", "Enumeration", "Binary")
 
-#: An integer that those of 1.0 may not reach.
+#: An integer that may be too large for 1.0.
 _LARGE = re.compile(r"[+-]?\d{10,}")
 
 
 def violations(root: str, text: bytes) -> list[str]:
-    """What is not as the schema has it, with the number of its line.
+    """Return the violations of the schema, with the numbers of their lines.
 
     Args:
         root: name of the root element.
@@ -105,10 +105,10 @@ def _schema(name: str) -> etree.XMLSchema:
 
 
 def _put_into_1_0(document: etree._Element) -> None:
-    """Leave out of a file of SSP 2.0 what 1.0 does not have, or put its like in its place.
+    """Remove or replace the parts of a file of SSP 2.0 that 1.0 does not have.
 
     Args:
-        document: its root element; lines stay what they are.
+        document: its root element; the numbers of lines stay.
 
     """
     document.set("version", VERSIONS[0])
@@ -118,7 +118,7 @@ def _put_into_1_0(document: etree._Element) -> None:
             parent.remove(element)
             continue
         of = family_of(name.localname)
-        # Annotations may have text, and values of texts were on lines of their own.
+        # Annotations may contain text, and values of texts were on lines of their own.
         element.tag, element.text = f"{{{name.namespace}}}{of}", None
         if parent is not None and etree.QName(parent).localname == "Parameter":
             # Lists are values of arrays.
@@ -135,25 +135,25 @@ def _put_into_1_0(document: etree._Element) -> None:
 
 _SUFFIX = Path(STRUCTURE).suffix
 
-#: Endings of descriptions that are read where they are, with the files beside them.
+#: Endings of descriptions that are read in place, with the files next to them.
 _LOOSE = (_SUFFIX, ".xml")
 
-#: A number, or that there may be none.
+#: A number or None.
 _Float = TypeVar("_Float", float, None)
 
 
 class Archive:
-    """An archive, unpacked, or a description in a folder, and the findings about it.
+    """An unpacked archive, or a description in a folder, with findings.
 
     Attributes:
-        path: of the archive, or of the folder or the description.
-        folder: into which it is unpacked, or with the description.
-        findings: what is wrong with it.
+        path: of the archive, the folder or the description.
+        folder: of the unpacked archive, or with the description.
+        findings: receives problems and notes.
 
     """
 
     def __init__(self, path: Path, findings: Findings) -> None:
-        """Unpack anything but a folder.
+        """Unpack the file unless it is a folder or a description.
 
         Raises:
             InputError: it cannot be unpacked.
@@ -168,19 +168,19 @@ class Archive:
             self.folder = path.resolve() if is_whole else path.resolve().parent
 
     def problem(self, text: object) -> None:
-        """Take note of what makes a run meaningless, or impossible."""
+        """Add a problem, which makes a run meaningless or impossible."""
         said = str(text).removeprefix(f"{self.path}: ")
         self.findings.problem(f"{self.path}: {said}")
 
     def note(self, text: object) -> None:
-        """Take note of what changes no number."""
+        """Add a note on a flaw that changes no number."""
         self.findings.note(f"{self.path}: {text}")
 
     def structure(self, variant: str | None) -> Element:
-        """The description of the system.
+        """Return the root element of the description of the system.
 
         Args:
-            variant: name of its file, with or without its ending; None: the default.
+            variant: name of its file, with or without ending; None: the default.
 
         Raises:
             InputError: there is none, or it cannot be read.
@@ -198,7 +198,7 @@ class Archive:
         return self.read(files[name])
 
     def read(self, path: Path) -> Element:
-        """The root element of a file of the archive.
+        """Return the root element of a file of the archive.
 
         Raises:
             InputError: it cannot be read.
@@ -216,7 +216,7 @@ class Archive:
         if version not in VERSIONS:
             stated = "no version" if version is None else f"version {version!r}"
             remarks.append(f"names {stated} of SSP; it is read as {VERSIONS[-1]}")
-        # Of other namespaces and versions the schemas know nothing.
+        # The schemas cover no other namespaces and versions.
         if not remarks and (wrong := violations(root.tag, text)):
             remarks.append(f"not valid: {listed(wrong, '; ')}")
         for remark in dict.fromkeys(remarks):
@@ -224,12 +224,12 @@ class Archive:
         return root
 
     def file(self, source: str, needer: str, base: Path | None = None) -> Path | None:
-        """A file that the description names; None, with a problem, if the archive has none.
+        """Return a file that the description names; None, with a problem, if it is missing.
 
         Args:
-            source: its address, a relative URI.
-            needer: what needs it, for the message.
-            base: the folder to which the address is relative; None: the description's folder.
+            source: address of the file, a relative URI.
+            needer: user of the file, for the message.
+            base: folder to which the address is relative; None: the description's folder.
 
         """
         base = self.folder if base is None else base
@@ -258,21 +258,21 @@ class Archive:
         return None
 
     def conversion(self, source: Unit | None, target: Unit | None) -> Linear | None:
-        """From one unit to another, as far as they are defined; None: the value stays as it is.
+        """Return the conversion between two units; None: the value stays as it is.
 
         Raises:
-            InputError: they measure different things.
+            InputError: they measure different quantities.
 
         """
         try:
             return conversion(source, target)
         except UndefinedUnit as error:
             self.note(f"{error}; values are taken as they are")
-            # Said to explain why the units at the ends differ.
+            # Stated so that the different units at the ends are accepted.
             return Linear()
 
     def required(self, element: Element, name: str, owner: str) -> str:
-        """An attribute that an element must have; empty, with a problem, where it has not.
+        """Return a required attribute of an element; empty, with a problem, if it is missing.
 
         Args:
             element: with the attribute.
@@ -285,7 +285,7 @@ class Archive:
         return element.get(name, "")
 
     def integer(self, element: Element, name: str) -> int:
-        """An attribute that is an integer; zero where it is not stated or, with a problem, none."""
+        """Return an integer attribute; zero if it is missing or, with a problem, not an integer."""
         text = element.get(name, "0")
         try:
             return integer(text)
@@ -294,12 +294,12 @@ class Archive:
             return 0
 
     def number(self, element: Element | None, name: str, otherwise: _Float) -> float | _Float:
-        """An attribute that is a number.
+        """Return a numeric attribute.
 
         Args:
-            element: with the attribute; None: there is none.
+            element: with the attribute; None: there is no element.
             name: of the attribute.
-            otherwise: its value where it is not stated or, with a problem, is not a number.
+            otherwise: value if it is missing or, with a problem, not a number.
 
         """
         text = None if element is None else element.get(name)

@@ -1,4 +1,4 @@
-"""The configuration of libcosim, which is read and written."""
+"""The configuration of libcosim, read and written."""
 
 from __future__ import annotations
 
@@ -18,29 +18,28 @@ from orchestrator.machine.errors import Findings, InputError, listed, reason
 from orchestrator.machine.texts import literal
 from orchestrator.machine.user_files import check_file, is_folder, read_archive
 
-#: The versions of FMI that libcosim knows and we can write.
+#: Versions of FMI that libcosim supports and we can write.
 _TAKEN = ("2.0",)
 
-#: What libcosim calls its file, and takes where that does not say it: a step [s], and an algorithm.
+#: Name of libcosim's file, and its defaults: a step [s] and an algorithm.
 OSP_STRUCTURE = "OspSystemStructure.xml"
 _STEP, _ALGORITHM = 0.1, "fixedStep"
 
-#: A step that differs less from a multiple of the communication step is that multiple.
+#: Relative difference below which a step is a multiple of the communication step.
 _ROUNDING = 1e-9
 
 _OSP = "http://opensimulationplatform.com/MSMI/OSPSystemStructure"
 
 
 def write_osp(system: System, folder: Path) -> list[Path]:
-    """Write `OspSystemStructure.xml` and the FMUs beside it, for libcosim and its command line.
+    """Write `OspSystemStructure.xml` and the FMUs next to it, for libcosim.
 
     Raises:
-        InputError: there is an FMU that libcosim cannot open, or a connection that this format has
-            no words for.
+        InputError: libcosim cannot open an FMU, or the format does not support a connection.
 
     """
     for connection in system.connections:
-        # No unit is converted there: values arrive as they are.
+        # libcosim does not convert units.
         if connection.transformation not in (None, Linear()):
             raise InputError(
                 f"{connection.source} -> {connection.target}: is transformed; write an SSP"
@@ -76,7 +75,7 @@ def write_osp(system: System, folder: Path) -> list[Path]:
         parameters = [
             (port, component.variable(port), value)
             for port, value in system.parameters_of(name).items()
-            # Of which libcosim knows none.
+            # libcosim does not support them.
             if component.variable(port).type != "Enumeration"
         ]
         if parameters:
@@ -95,21 +94,21 @@ def write_osp(system: System, folder: Path) -> list[Path]:
 
 
 def read_osp(path: Path, findings: Findings | None = None) -> System:
-    """Read the system that libcosim runs.
+    """Read a system for libcosim.
 
     Args:
-        path: of its file, or of the folder with it.
-        findings: takes all that is wrong with it.
+        path: of the file, or of its folder.
+        findings: receives problems and notes.
 
     Raises:
-        InputError: the file is missing, broken, or uses what this master cannot do.
+        InputError: the file is missing, broken, or uses unsupported features.
 
     """
     path = path / OSP_STRUCTURE if is_folder(path) else path
     archive = Archive(path, Findings() if findings is None else findings)
     root = _root(path)
     components = _components(archive, root)
-    # All else that names one of those that are missing would follow from it.
+    # Missing components would cause further problems.
     archive.findings.refuse()
     connections = tuple(_connections(archive, root, components))
     algorithm = root.findtext("Algorithm", _ALGORITHM).strip()
@@ -133,7 +132,7 @@ def read_osp(path: Path, findings: Findings | None = None) -> System:
 
 
 def _root(path: Path) -> Element:
-    """The root element, in which all have their local names."""
+    """Return the root element, with local names of all tags."""
     check_file(path)
     try:
         root = ElementTree.fromstring(path.read_bytes())
@@ -173,7 +172,7 @@ def _components(archive: Archive, root: Element) -> dict[str, Component]:
 
 
 def _steps(archive: Archive, root: Element, step: float) -> dict[str, float]:
-    """Steps of components, of which libcosim makes multiples of the communication step."""
+    """Return the steps of components, as libcosim rounds them to multiples of the step."""
     steps = {}
     for name, simulator in _simulators(root):
         own = archive.number(simulator, "stepSize", 0.0)
@@ -188,7 +187,7 @@ def _steps(archive: Archive, root: Element, step: float) -> dict[str, float]:
 def _connections(
     archive: Archive, root: Element, components: Mapping[str, Component]
 ) -> Iterator[Connection]:
-    """The connections of variables, directly or by way of a linear transformation."""
+    """Yield the connections of variables, direct or through a linear transformation."""
     functions: dict[str, Linear | None] = {}
     signals: dict[tuple[str, str], list[PortName]] = {}
     for element in root.iterfind("Functions/*"):
@@ -223,14 +222,14 @@ def _connections(
 def _connection(
     archive: Archive, components: Mapping[str, Component], *ends: PortName
 ) -> Connection:
-    """A connection, which may be written from either end; units are not converted."""
+    """Make a connection, which may be written from either end; units are not converted."""
     try:
         owners = [components[end.component] for end in ends]
         causality = owners[0].variable(ends[0].port).causality
         source, target = ends if causality in ("output", "calculatedParameter") else ends[::-1]
         units = [unit_of_port(owner, end.port) for owner, end in zip(owners, ends, strict=True)]
     except (KeyError, InputError):
-        # What is wrong with its names, the system says.
+        # The check of the system reports wrong names.
         return Connection(ends[0], ends[1])
     try:
         if conversion(*units) is None:
@@ -248,7 +247,7 @@ def _parameters(
     components: Mapping[str, Component],
     connections: tuple[Connection, ...],
 ) -> dict[PortName, Value]:
-    """Initial values, without the ones that have no effect."""
+    """Return the initial values that have an effect."""
     fed = {connection.target: connection.source for connection in connections}
     parameters: dict[PortName, Value] = {}
     for name, simulator in _simulators(root):

@@ -1,4 +1,4 @@
-"""Read an SSP archive as a system, with the experiment that it states."""
+"""Read an SSP archive as a system with its experiment."""
 
 from __future__ import annotations
 
@@ -32,41 +32,41 @@ from orchestrator.cosim.variables import MOST_ELEMENTS, Value, element_names, fa
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, listed, shortened
 from orchestrator.machine.texts import BOOLEANS, finite, integer, real, whole
 
-#: An enumeration's values by the names of its items.
+#: Values of an enumeration by item.
 Items: TypeAlias = Mapping[str, int]
 
-#: The names of a system and of the systems around it, except the outermost.
-Way: TypeAlias = tuple[str, ...]
+#: Names of a system and of the systems around it, without the outermost.
+SystemPath: TypeAlias = tuple[str, ...]
 
-#: Which way a value goes, by the kind of an element's connector, seen from the system around it.
+#: Kinds of connectors whose value leaves the element, and whose value enters it.
 GIVES = ("output", "calculatedParameter", "constant", "local", "independent")
 TAKES = ("input", "parameter", "structuralParameter")
 
 _FMU = "application/x-fmu-sharedlibrary"
 
-#: What a connector may have besides its type.
+#: Child elements of a connector that are not its type.
 _NO_TYPES = ("Dimension", "Clock", "ConnectorGeometry", "Annotations")
 
 
 @dataclass(frozen=True)
 class Definitions:
-    """Units and enumerations by their names."""
+    """Units and enumerations by name."""
 
     units: Units = field(default_factory=dict)
     enumerations: Mapping[str, Items] = field(default_factory=dict)
 
     def unit(self, element: Element) -> Unit | None:
-        """The unit that a type or a value is stated in; None: it states none."""
+        """Return the unit of a type or a value, or None."""
         name = element.get("unit")
         return self.units.get(name, Unit(name)) if name else None
 
     def items(self, element: Element) -> Items:
-        """The items of the enumeration that a type or a value names; empty where there is none."""
+        """Return the items of the enumeration of a type or a value, if it is one."""
         return self.enumerations.get(element.get("name", ""), {})
 
 
 def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Definitions:
-    """The definitions of a file, which win over those around it."""
+    """Return the definitions of a file, which replace those around it."""
     units = dict(outer.units)
     for unit in root.findall("Units/Unit"):
         name, base = unit.get("name", ""), unit.find("BaseUnit")
@@ -88,10 +88,10 @@ def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Defin
 
 
 def shape_of(content: Element) -> list[int]:
-    """The lengths of an array as a connector or parameter states them; of a scalar, none.
+    """Return the lengths of an array in a connector or parameter; empty: it is a scalar.
 
     Raises:
-        ValueError: it does not state them, or they are of no use.
+        ValueError: a length is missing or not usable.
 
     """
     try:
@@ -108,29 +108,29 @@ class Node:
     """A connector, or a variable of a component.
 
     Attributes:
-        way: to the element.
+        way: names of the systems and of the element.
         port: name of the connector.
 
     """
 
-    way: Way
+    way: SystemPath
     port: str
 
     def __str__(self) -> str:
-        """With dots, as parameters and columns are named."""
+        """Format with dots, like parameters and columns."""
         return ".".join((*self.way, self.port))
 
 
 @dataclass(frozen=True)
 class Connector:
-    """What a system says about one of its connectors, or an element's.
+    """A connector of a system or of an element, as the file states it.
 
     Attributes:
-        causality: of the connector; None: it does not say.
-        type: what FMI 2.0 calls it or its like; None: it does not say.
-        unit: None: it names none.
+        causality: None: not stated.
+        type: in FMI 2.0, or its equivalent there; None: not stated.
+        unit: None: not stated.
         items: of an enumeration.
-        elements: the names of an array's elements, which are connectors as well.
+        elements: names of an array's elements, which are also connectors.
 
     """
 
@@ -142,26 +142,26 @@ class Connector:
 
 
 @dataclass(frozen=True)
-class Leaf:
-    """A component.
+class ComponentElement:
+    """A component in the file.
 
     Attributes:
-        way: to it.
-        content: its element in the file.
-        component: None: its FMU cannot be read, which has been said.
-        connectors: that the file states.
-        units: that the file defines.
+        way: its names, from the outermost system on.
+        content: element of the file.
+        component: None: its FMU cannot be read, which is a problem already.
+        connectors: in the file.
+        units: defined in the file.
 
     """
 
-    way: Way
+    way: SystemPath
     content: Element
     component: Component | None
     connectors: Mapping[str, Connector]
     units: Units
 
     def connector(self, name: str) -> Connector | None:
-        """A connector as the FMU has it; None: it has none of that name."""
+        """Return a connector as the FMU has it; None: there is no such connector."""
         if self.component is None:
             return self.connectors.get(name, Connector())
         if name in self.component.arrays:
@@ -177,10 +177,10 @@ class Leaf:
         return Connector(variable.causality, variable.family, unit, items)
 
     def named(self, name: str) -> Iterator[tuple[Node, Connector]]:
-        """The variable of a name.
+        """Yield the variable of a name, if there is one.
 
         Raises:
-            InputError: it is of a type that is not supported.
+            InputError: its type is not supported.
 
         """
         if self.component is None:
@@ -192,85 +192,89 @@ class Leaf:
 
 
 @dataclass(frozen=True)
-class Bus:
-    """A reference to a signal dictionary: all of its references have the same signals.
+class DictionaryReference:
+    """A reference to a signal dictionary: all references to one share its signals.
 
     Attributes:
-        way: to the dictionary.
-        content: the reference's element in the file.
-        connectors: that the file states.
+        way: of the dictionary.
+        content: element of the reference in the file.
+        connectors: in the file.
 
     """
 
-    way: Way
+    way: SystemPath
     content: Element
     connectors: Mapping[str, Connector]
 
     def connector(self, name: str) -> Connector | None:
-        """A connector, through which signals go in both directions."""
+        """Return a connector, whose signal may go either way."""
         stated = self.connectors.get(name)
         return None if stated is None else replace(stated, causality=None)
 
     def named(self, _: str) -> Iterator[tuple[Node, Connector]]:
-        """Nothing in it has a value."""
+        """Yield nothing: a dictionary has no values."""
         yield from ()
 
 
 @dataclass(frozen=True)
-class Group:
-    """A system.
+class SystemElement:
+    """A system in the file.
 
     Attributes:
-        way: to it.
-        content: its element in the file.
-        connectors: its own.
-        members: its elements by their names.
+        way: its names, without the outermost system.
+        content: element of the file.
+        connectors: of the system itself.
+        members: elements in it, by name.
 
     """
 
-    way: Way
+    way: SystemPath
     content: Element
     connectors: Mapping[str, Connector]
-    members: Mapping[str, Leaf | Bus | Group]
+    members: Mapping[str, _AnyElement]
 
     def connector(self, name: str) -> Connector | None:
-        """One of its connectors; None: it has none of that name."""
+        """Return one of its connectors; None: there is no such connector."""
         return self.connectors.get(name)
 
     def named(self, name: str) -> Iterator[tuple[Node, Connector]]:
-        """All connectors and variables in it of a name, which several ways may spell."""
+        """Yield all connectors and variables in it of a name, whose dots may be ambiguous."""
         if name in self.connectors:
             yield Node(self.way, name), self.connectors[name]
         for member, element in self.members.items():
             if name.startswith(f"{member}."):
                 yield from element.named(name[len(member) + 1 :])
 
-    def elements(self) -> Iterator[Leaf | Bus | Group]:
-        """All elements in it in their order, each system before those in it; first itself."""
+    def elements(self) -> Iterator[_AnyElement]:
+        """Yield the system, then all elements in it, each system before its elements."""
         yield self
         for element in self.members.values():
-            if isinstance(element, Group):
+            if isinstance(element, SystemElement):
                 yield from element.elements()
             else:
                 yield element
+
+
+#: An element of a system in the file.
+_AnyElement: TypeAlias = ComponentElement | DictionaryReference | SystemElement
 
 
 class Builder:
     """Reads the systems of a description."""
 
     def __init__(self, archive: Archive, definitions: Definitions) -> None:
-        """Take the archive, and what its description defines."""
+        """Take the archive and the definitions of its description."""
         self._archive, self._definitions = archive, definitions
 
     def group(
-        self, content: Element, way: Way = (), buses: Mapping[str, Way] | None = None
-    ) -> Group:
-        """A system and all that is in it.
+        self, content: Element, way: SystemPath = (), buses: Mapping[str, SystemPath] | None = None
+    ) -> SystemElement:
+        """Read a system with everything in it.
 
         Args:
-            content: its element.
-            way: to it.
-            buses: ways to the signal dictionaries of the systems around it, by their names.
+            content: element of the file.
+            way: names of the system.
+            buses: signal dictionaries of the systems around it, by name.
 
         """
         own = content.findall("SignalDictionaries/SignalDictionary")
@@ -278,7 +282,7 @@ class Builder:
             **(buses or {}),
             **{name: (*way, name, "") for d in own if (name := d.get("name"))},
         }
-        members: dict[str, Leaf | Bus | Group] = {}
+        members: dict[str, _AnyElement] = {}
         for element in content.findall("Elements/*"):
             name = element.get("name", "")
             if not re.fullmatch(r"[^/\\]+", name):
@@ -292,17 +296,19 @@ class Builder:
             elif element.tag == "SignalDictionaryReference":
                 bus = element.get("dictionary", "")
                 if bus in buses:
-                    members[name] = Bus(buses[bus], element, self._connectors(element))
+                    members[name] = DictionaryReference(
+                        buses[bus], element, self._connectors(element)
+                    )
                 else:
                     self._archive.problem(f"{name}: there is no signal dictionary {bus!r}")
             else:
                 self._archive.problem(f"{name}: a <{element.tag}> in a system is not supported")
-        return Group(way, content, self._connectors(content), members)
+        return SystemElement(way, content, self._connectors(content), members)
 
-    def _leaf(self, content: Element, way: Way) -> Leaf:
+    def _leaf(self, content: Element, way: SystemPath) -> ComponentElement:
         component = self._component(content, ".".join(way))
         connectors = self._connectors(content)
-        leaf = Leaf(way, content, component, connectors, self._definitions.units)
+        leaf = ComponentElement(way, content, component, connectors, self._definitions.units)
         if component is not None:
             self._compare(leaf)
         return leaf
@@ -326,8 +332,8 @@ class Builder:
         self._archive.problem(f"{name}: {why}")
         return None
 
-    def _compare(self, leaf: Leaf) -> None:
-        """Say where connectors are not what their FMU has."""
+    def _compare(self, leaf: ComponentElement) -> None:
+        """Add notes where connectors differ from their FMU."""
         absent = []
         elements = {name for stated in leaf.connectors.values() for name in stated.elements}
         known = leaf.component.unsupported if leaf.component else {}
@@ -362,7 +368,7 @@ class Builder:
                 if shape := shape_of(connector):
                     elements = tuple(element_names(name, shape))
             except ValueError as error:
-                # Of a component the FMU says it.
+                # For a component, the FMU decides.
                 if content.tag != "Component":
                     self._archive.problem(f"{content.get('name', '')}.{name} {error}")
             found |= {name: replace(stated, elements=elements), **dict.fromkeys(elements, stated)}
@@ -383,19 +389,19 @@ _TABLES = (
     "EnumerationMappingTransformation",
 )  # fmt: skip
 
-#: The types of files that are known.
+#: Supported types of files.
 _VALUES, _MAPPING = "application/x-ssp-parameter-set", "application/x-ssp-parameter-mapping"
 
 
 def _transformation(content: Element, source: Items, target: Items) -> Transformation | None:
-    """The transformation in a connection or an entry of a mapping; None: there is none.
+    """Return the transformation of a connection or an entry of a mapping; None: there is none.
 
     Args:
         content: element of the connection or entry.
-        source, target: values of the enumerations at its ends, if there are any.
+        source, target: items of the enumerations at its ends.
 
     Raises:
-        ValueError: it has a mistake.
+        ValueError: it is wrong.
 
     """
     linear = content.find("LinearTransformation")
@@ -417,7 +423,7 @@ def _transformation(content: Element, source: Items, target: Items) -> Transform
 
 
 def _value(table: str, entry: Element, end: str, items: Items) -> int:
-    """One value of a table, as the number that FMI has for it."""
+    """Return a value of a mapping, as FMI's number."""
     text = entry.get(end, "")
     if table.startswith("Boolean"):
         if text not in BOOLEANS:
@@ -431,19 +437,19 @@ def _value(table: str, entry: Element, end: str, items: Items) -> int:
 
 
 def _converts_units(content: Element) -> bool:
-    """Whether a connection or an entry of a mapping has units converted."""
+    """Return True if units are converted in a connection or an entry of a mapping."""
     return not BOOLEANS.get(content.get("suppressUnitConversion", "false"), False)
 
 
 @dataclass(frozen=True)
 class Segment:
-    """One connection of a file, which ends in a node.
+    """A connection of the file, which ends in a node.
 
     Attributes:
-        source: where its value comes from.
-        unit: of its target; None: it is the one that arrives.
-        stated: transformation of the value, after its unit has been converted.
-        converts: whether its unit is converted.
+        source: origin of its value.
+        unit: of its target; None: the unit that arrives.
+        stated: transformation of the value, after the conversion of its unit.
+        converts: True if its unit is converted.
 
     """
 
@@ -455,36 +461,36 @@ class Segment:
     def carry(
         self, archive: Archive, whole: Transformation | None, unit: Unit | None
     ) -> tuple[Transformation | None, Unit | None]:
-        """What has happened to a value at the segment's end, and the unit that it has there.
+        """Return the transformation and the unit of a value at the segment's end.
 
         Args:
-            archive: whose connection it is.
-            whole: what has happened to it before.
-            unit: in which it comes.
+            archive: with the connection.
+            whole: transformation of the value until the segment.
+            unit: of the value at the segment's begin.
 
         Raises:
-            InputError: units do not fit, or transformations cannot follow each other.
+            InputError: units do not fit, or transformations cannot be combined.
 
         """
         step = self.stated
         if self.converts:
             step = combine(archive.conversion(unit, self.unit), step)
-            # What a transformation makes of a value is in the target's unit, or unknown.
+            # A transformed value has the target's unit, or an unknown one.
             unit = self.unit or (unit if self.stated is None else None)
         else:
-            # Said even where it changes nothing: the units at its ends may differ.
+            # Stated even if it changes nothing: the units at the ends may differ.
             step, unit = step or Linear(), self.unit
         return combine(whole, step), unit
 
 
-def segments_of(archive: Archive, top: Group) -> dict[Node, Segment]:
-    """The connections of a system and of those in it, by the nodes in which they end.
+def segments_of(archive: Archive, top: SystemElement) -> dict[Node, Segment]:
+    """Return the connections in a system, by the nodes in which they end.
 
-    What is wrong with one becomes a problem of the archive.
+    A wrong connection is a problem of the archive.
     """
     found: dict[Node, Segment] = {}
     for group in top.elements():
-        if isinstance(group, Group):
+        if isinstance(group, SystemElement):
             for connection in group.content.findall("Connections/Connection"):
                 try:
                     _add(found, group, connection)
@@ -493,13 +499,13 @@ def segments_of(archive: Archive, top: Group) -> dict[Node, Segment]:
     return found
 
 
-def _add(found: dict[Node, Segment], group: Group, connection: Element) -> None:
+def _add(found: dict[Node, Segment], group: SystemElement, connection: Element) -> None:
     start, end = (_End.of(group, connection, which) for which in ("start", "end"))
     named = f"{start.node} -> {end.node}"
     if (start.takes and end.takes) or (start.gives and end.gives):
         both = "take a value" if start.takes else "give one"
         raise InputError(f"{named}: cannot be connected, as both {both}")
-    # The standard lets a connection be written from either end.
+    # SSP allows a connection to be written from either end.
     source, target = (end, start) if start.takes or end.gives else (start, end)
     if source.indices != target.indices:
         raise InputError(f"{named}: arrays of different dimensions cannot be connected")
@@ -519,12 +525,12 @@ def _add(found: dict[Node, Segment], group: Group, connection: Element) -> None:
 
 @dataclass(frozen=True)
 class _End:
-    """An end of a connection, as the system sees it in which the connection is.
+    """An end of a connection, seen from the system of the connection.
 
     Attributes:
-        node: where it is.
-        connector: what is known of it.
-        gives, takes: which way its value goes; neither: both are possible.
+        node: of the end.
+        connector: of the end.
+        gives, takes: direction of its value; neither: either is possible.
 
     """
 
@@ -535,23 +541,23 @@ class _End:
 
     @property
     def indices(self) -> list[str]:
-        """What follows its name in the names of its elements; of a scalar, nothing."""
+        """Suffixes of the names of its elements; a scalar has an empty one."""
         return _indices(self.node, self.connector)
 
     def element(self, index: str) -> Node:
-        """One of its elements."""
+        """Return the node of one of its elements."""
         return Node(self.node.way, self.node.port + index)
 
     @classmethod
-    def of(cls, group: Group, connection: Element, which: str) -> _End:
-        """The start or the end of a connection."""
-        # Some writers leave it empty where it is the system itself.
+    def of(cls, group: SystemElement, connection: Element, which: str) -> _End:
+        """Read the start or the end of a connection."""
+        # Some tools leave the element empty for the system itself.
         name, port = connection.get(f"{which}Element") or None, connection.get(f"{which}Connector")
         if not port:
             raise InputError(f"a <{connection.tag}> without {which}Connector")
         if indices := connection.get(f"{which}Indices"):
             port = f"{port}[{','.join(indices.split())}]"
-        element: Leaf | Bus | Group | None = group if name is None else group.members.get(name)
+        element: _AnyElement | None = group if name is None else group.members.get(name)
         if element is None:
             raise InputError(
                 f"a connection to {Node((*group.way, name or ''), port)}: "
@@ -559,32 +565,32 @@ class _End:
             )
         connector = element.connector(port)
         if connector is None:
-            if isinstance(element, Leaf) and element.component is not None:
+            if isinstance(element, ComponentElement) and element.component is not None:
                 element.component.variable(port)
             raise InputError(
                 f"a connection to {Node(element.way, port)}, which does not exist"
                 f"{did_you_mean(port, element.connectors)}"
             )
         outwards, inwards = connector.causality in GIVES, connector.causality in TAKES
-        # Seen from within, a system's inputs give and its outputs take.
+        # From inside, the inputs of a system give values and its outputs take them.
         gives, takes = (inwards, outwards) if element is group else (outwards, inwards)
         return cls(Node(element.way, port), connector, gives, takes)
 
 
 def _indices(node: Node, connector: Connector) -> list[str]:
-    """What follows a name in the names of the elements of its array; of a scalar, nothing."""
+    """Return the suffixes of an array's elements; a scalar has an empty one."""
     return [name.removeprefix(node.port) for name in connector.elements] or [""]
 
 
 @dataclass(frozen=True)
 class Given:
-    """A value of a parameter set, and what happens to it on its way to a node.
+    """A value of a parameter set, and its changes on the way to a node.
 
     Attributes:
-        text: the value.
-        unit: of the value; None: the node's.
-        items: values of its enumeration; empty: the variable's count.
-        entry: of the mapping that it came through.
+        text: of the value.
+        unit: of the value; None: the node's unit.
+        items: of its enumeration; empty: those of the variable.
+        entry: of the mapping for it.
 
     """
 
@@ -594,10 +600,10 @@ class Given:
     entry: Element | None = None
 
     def transformation(self, archive: Archive, target: Connector) -> Transformation | None:
-        """What makes of it the value of a node.
+        """Return the transformation to the value of a node.
 
         Raises:
-            ValueError: units do not fit, or the mapping has a mistake.
+            ValueError: units do not fit, or the mapping is wrong.
 
         """
         stated = None
@@ -608,10 +614,10 @@ class Given:
         return combine(archive.conversion(self.unit, target.unit), stated)
 
 
-#: What is given to nodes, and what is known of each of these.
+#: Values that are given to nodes, with the connectors of these.
 Values: TypeAlias = dict[Node, tuple[Given, Connector]]
 
-#: The values of a parameter's elements, by what follows its name in theirs; of a scalar, nothing.
+#: Values of a parameter's elements by the suffixes of their names; a scalar has an empty one.
 _Elements: TypeAlias = dict[str, Given]
 
 
@@ -619,13 +625,13 @@ class Bindings:
     """The values of all parameter sets of a description."""
 
     def __init__(self, archive: Archive, definitions: Definitions) -> None:
-        """Take the archive, and what its description defines."""
+        """Take the archive and the definitions of its description."""
         self._archive, self._definitions = archive, definitions
 
-    def values(self, top: Group) -> Values:
-        """What is given to which node.
+    def values(self, top: SystemElement) -> Values:
+        """Return the values that are given to nodes.
 
-        Of several values the one of the outer system counts, then the one of the later set.
+        If several are given to one node, the outer system wins, then the later set.
         """
         given: Values = {}
         for element in _inside_out(top):
@@ -636,7 +642,12 @@ class Bindings:
                     self._archive.problem(error)
         return given
 
-    def _apply(self, binding: Element, element: Leaf | Bus | Group, given: Values) -> None:
+    def _apply(
+        self,
+        binding: Element,
+        element: _AnyElement,
+        given: Values,
+    ) -> None:
         where = ".".join(element.way) or "the system"
         values = self._content(binding, element, where, "ParameterValues/ParameterSet", _VALUES)
         if values is None:
@@ -662,15 +673,20 @@ class Bindings:
                 given.update(reached)
                 if not reached:
                     unknown.append(name + index)
-        if unknown and not (isinstance(element, Leaf) and element.component is None):
+        if unknown and not (isinstance(element, ComponentElement) and element.component is None):
             self._archive.note(
                 f"{where} has nothing named {listed(unknown)}; values for it have no effect"
             )
 
     def _content(
-        self, element: Element, owner: Leaf | Bus | Group, where: str, inline: str, media_type: str
+        self,
+        element: Element,
+        owner: _AnyElement,
+        where: str,
+        inline: str,
+        media_type: str,
     ) -> Element | None:
-        """What an element holds, itself or in the file that it names."""
+        """Return the content of an element, or of the file that it names."""
         stated = element.get("type", media_type)
         if stated != media_type:
             self._archive.problem(f"{where}: parameters of type {stated!r} are not supported")
@@ -683,7 +699,7 @@ class Bindings:
             return found
         base = None
         if element.get("sourceBase", "SSD") != "SSD":
-            if not isinstance(owner, Leaf) or owner.component is None:
+            if not isinstance(owner, ComponentElement) or owner.component is None:
                 named = ".".join(owner.way)
                 raise InputError(f"a file of {named!r}, which is not a component with an FMU")
             base = owner.component.folder
@@ -693,7 +709,7 @@ class Bindings:
     def _mapped(
         self, parameters: dict[str, _Elements], mapping: Element, where: str
     ) -> dict[str, _Elements]:
-        """Those parameters that a mapping names, under their new names."""
+        """Return the parameters in a mapping, under their new names."""
         found = {}
         for entry in mapping.findall("MappingEntry"):
             source, target = (
@@ -705,7 +721,7 @@ class Bindings:
         return found
 
     def _parameters(self, values: Element, where: str) -> dict[str, _Elements]:
-        """The values of a parameter set by their names."""
+        """Return the values of a parameter set by name."""
         known = definitions_of(self._archive, values, self._definitions)
         found: dict[str, _Elements] = {}
         for parameter in values.findall("Parameters/Parameter"):
@@ -732,25 +748,27 @@ class Bindings:
 
 
 def _texts(value: Element, is_array: bool) -> list[str]:
-    """The values of a parameter, in the order of an array's elements."""
+    """Return the values of a parameter, in the order of an array's elements."""
     if is_array and family_of(value.tag) in ("Real", "Integer", "Boolean"):
         return value.get("value", "").split()
     several = value.findall("Value")
     return [text for one in several or [value] if (text := one.get("value")) is not None]
 
 
-def _inside_out(group: Group) -> Iterator[Leaf | Bus | Group]:
-    """All elements of a system, each after those in it."""
+def _inside_out(
+    group: SystemElement,
+) -> Iterator[_AnyElement]:
+    """Yield all elements of a system, each system after its elements."""
     for element in group.members.values():
-        if isinstance(element, Group):
+        if isinstance(element, SystemElement):
             yield from _inside_out(element)
         else:
             yield element
     yield group
 
 
-#: Elements and attributes of annotations that hold the step of a whole system: those of libcosim
-#: and ecos, of Vico, and of OMSimulator.
+#: Elements and attributes of annotations with the step of a system, in libcosim and ecos, Vico, and
+#: OMSimulator.
 _STEPS = (
     ("FixedStepAlgorithm", "baseStepSize"),
     ("FixedStepMaster", "baseStepSize"),
@@ -758,22 +776,22 @@ _STEPS = (
     ("SimulationInformation", "fixedStepSize"),
 )
 
-#: The same of a component.
+#: The same for components.
 _STEPS_OF_COMPONENTS = (("StepSizeHint", "value"),)
 
 _ROOT = "SystemStructureDescription"
 
 
 def read_ssp(path: Path, variant: str | None = None, findings: Findings | None = None) -> System:
-    """Read the system in an SSP archive, or in the folder of one that is unpacked.
+    """Read the system of an SSP archive, or of the folder of an unpacked one.
 
     Args:
         path: of the archive, the folder, or a description in it.
-        variant: which of its descriptions; None: the default.
-        findings: takes all that is wrong with it.
+        variant: name of a description; None: the default.
+        findings: receives problems and notes.
 
     Raises:
-        InputError: the archive is missing, broken, or uses what this master cannot do.
+        InputError: the archive is missing, broken, or uses unsupported features.
 
     """
     findings = Findings() if findings is None else findings
@@ -797,8 +815,8 @@ def read_parameter_set(
 
     Args:
         path: of the SSV.
-        component: whose parameters it sets.
-        findings: takes all that is wrong with it.
+        component: with the parameters.
+        findings: receives problems and notes.
 
     Raises:
         InputError: the set cannot be read, or a value is not of the type of its variable.
@@ -823,7 +841,7 @@ def _read(archive: Archive, root: Element, content: Element) -> System:
     definitions = definitions_of(archive, root, Definitions())
     experiment = root.find("DefaultExperiment")
     top = Builder(archive, definitions).group(content)
-    leaves = {leaf.way: leaf for leaf in top.elements() if isinstance(leaf, Leaf)}
+    leaves = {leaf.way: leaf for leaf in top.elements() if isinstance(leaf, ComponentElement)}
     segments = segments_of(archive, top)
     ports = _Ports(archive, leaves, segments, Bindings(archive, definitions).values(top))
     components: dict[str, Component] = {}
@@ -836,7 +854,7 @@ def _read(archive: Archive, root: Element, content: Element) -> System:
     stated = _annotated(experiment, ORDER)
     ordered = [element.get("name", "") for order in stated for element in order]
     components = {name: components[name] for name in (*ordered, *components) if name in components}
-    # A component whose step is zero has no wish.
+    # A component with a step of zero has no step of its own.
     steps = {
         ".".join(way): step
         for way, leaf in leaves.items()
@@ -865,7 +883,7 @@ def _read(archive: Archive, root: Element, content: Element) -> System:
 
 
 def _annotated(element: Element | None, name: str) -> Iterator[Element]:
-    """Elements of a name in the annotations of an element itself."""
+    """Yield elements of a name in the annotations of an element itself."""
     if element is not None:
         for annotations in element.findall("Annotations"):
             yield from annotations.iter(name)
@@ -874,7 +892,7 @@ def _annotated(element: Element | None, name: str) -> Iterator[Element]:
 def _step(
     archive: Archive, words: Iterable[tuple[str, str]], *places: Element | None
 ) -> float | None:
-    """The step that the annotations of some places ask for [s]; None: they do not say."""
+    """Return the step in the annotations of some elements [s]; None: there is none."""
     for name, attribute in words:
         for element in chain.from_iterable(_annotated(place, name) for place in places):
             if (step := archive.number(element, attribute, None)) is not None:
@@ -884,41 +902,42 @@ def _step(
 
 @dataclass(frozen=True)
 class _Arrival:
-    """What is known of a value at a node.
+    """A value at a node.
 
     Attributes:
-        start: where it sets out: at a component's port, or where it is given; None: there is none.
-        leaf: the component that it comes from; None: it is given.
-        whole: its transformation since.
-        unit: that it has.
-        error: why it cannot come so far.
+        start: origin of the value: a component's port, or the node to which it is given; None: no
+            value.
+        leaf: component of the origin; None: the value is given.
+        whole: transformation on the way.
+        unit: of the value.
+        error: reason why the value cannot arrive.
 
     """
 
     start: Node | None
-    leaf: Leaf | None = None
+    leaf: ComponentElement | None = None
     whole: Transformation | None = None
     unit: Unit | None = None
     error: InputError | None = None
 
 
 class _Ports:
-    """What feeds and what sets the ports of components.
+    """The connections and parameters of components.
 
     Attributes:
         connections: between components.
-        parameters: values of ports that nothing feeds, in the types of their variables.
+        parameters: values of unconnected ports, in the types of their variables.
 
     """
 
     def __init__(
         self,
         archive: Archive,
-        leaves: Mapping[Way, Leaf],
+        leaves: Mapping[SystemPath, ComponentElement],
         segments: Mapping[Node, Segment],
         given: Values,
     ) -> None:
-        """Follow each port upstream."""
+        """Follow each port to its origin."""
         self.connections: list[Connection] = []
         self.parameters: dict[PortName, Value] = {}
         self._archive, self._leaves = archive, leaves
@@ -937,8 +956,8 @@ class _Ports:
         if lost:
             archive.note(f"values that are given to {listed(lost)} reach no component")
 
-    def _enter(self, port: PortName, node: Node, leaf: Leaf) -> None:
-        """Enter what arrives at a port: another's value, or the outermost that is given."""
+    def _enter(self, port: PortName, node: Node, leaf: ComponentElement) -> None:
+        """Enter the value that arrives at a port: another port's, or a given one."""
         arrival = self._arrival(node) if node in self._segments else self._given_to(node)
         if arrival.leaf is None:
             self._set(port, leaf, arrival)
@@ -949,13 +968,13 @@ class _Ports:
             self.connections.append(Connection(source, port, arrival.whole))
 
     def _arrival(self, node: Node) -> _Arrival:
-        """What is known of a value at a node.
+        """Return the value at a node.
 
-        It is followed upstream to what another port has been followed through: so all of them take
-        linear time.
+        The search ends where an earlier one has passed, so that all of them together take linear
+        time.
 
         Raises:
-            InputError: its connections lead in a circle.
+            InputError: its connections form a circle.
 
         """
         upstream: dict[Node, Segment] = {}
@@ -973,7 +992,7 @@ class _Ports:
         return arrival
 
     def _setting_out(self, node: Node) -> _Arrival:
-        """A node that no connection ends in."""
+        """Return the value at a node that no connection ends in."""
         leaf = self._leaves.get(node.way)
         if leaf is None:
             return self._given_to(node)
@@ -981,7 +1000,7 @@ class _Ports:
         return _Arrival(node, leaf, unit=connector.unit if connector else None)
 
     def _carried(self, before: _Arrival, node: Node, segment: Segment) -> _Arrival:
-        """What arrives at the end of a connection."""
+        """Return the value at the end of a connection."""
         if before.start is None:
             return self._given_to(node)
         self._used.add(node)
@@ -998,15 +1017,15 @@ class _Ports:
         return replace(before, whole=whole, unit=unit)
 
     def _given_to(self, node: Node) -> _Arrival:
-        """A node that no value has come to before: there begins the one that is given to it."""
+        """Return the value that is given to a node without another one."""
         self._used.add(node)
         if node not in self._given:
             return _Arrival(None)
         given, connector = self._given[node]
         return _Arrival(node, unit=connector.unit or given.unit)
 
-    def _set(self, port: PortName, leaf: Leaf, arrival: _Arrival) -> None:
-        """Give a port the value that arrives, if any does."""
+    def _set(self, port: PortName, leaf: ComponentElement, arrival: _Arrival) -> None:
+        """Set a port to the value that arrives, if there is one."""
         if arrival.start is None:
             return
         given, target = self._given[arrival.start]
@@ -1038,13 +1057,13 @@ class _Ports:
         self.parameters[port] = component.variable(port.port).typed(value, str(port))
 
     def _keep_size(self, port: PortName, component: Component, text: str) -> None:
-        """Refuse another size of arrays than the one that their FMU describes."""
+        """Refuse to change the sizes of arrays."""
         if component.variable(port.port).typed(text, str(port)) != component.start(port.port):
             raise InputError(f"{port} = {shortened(text)}: sizes of arrays cannot be changed")
 
 
 def _number(port: PortName, text: str, is_mapped: bool) -> float:
-    """A value that is transformed, as a number; one that is mapped is exact."""
+    """Return a number to be transformed; for a mapping it is exact."""
     if is_mapped:
         with suppress(ValueError):
             return integer(text)

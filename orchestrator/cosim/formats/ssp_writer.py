@@ -1,9 +1,9 @@
-"""Write a system as an SSP archive: 1.0, or 2.0 where there are FMUs of FMI 3.0 in it.
+"""Write a system as an SSP archive: 1.0, or 2.0 if it contains FMUs of FMI 3.0.
 
-The dots of a component's name say which systems it is in: `fleet.one.part` is the element `part`
-of the system `one` of the system `fleet`. A value that leaves or enters a system has one connector
-there, however many inputs it feeds beyond it. It passes all borders as it is, an array as a whole:
-only the last connection on its way picks an element, or transforms it.
+The dots of a component's name give its place: `fleet.one.part` is the element `part` of the system
+`one` in the system `fleet`. A value that leaves or enters a system has one connector there, however
+many inputs it feeds. It passes all borders unchanged, an array as a whole: only the last connection
+on its way picks an element, or transforms the value.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from orchestrator.cosim.connection import (
     unit_of_port,
 )
 from orchestrator.cosim.formats.archive import LEFT_OPEN, OMS, ORDER, OSP, SSC, SSD, SSV, STRUCTURE
-from orchestrator.cosim.formats.ssp_reader import Way
+from orchestrator.cosim.formats.ssp_reader import SystemPath
 from orchestrator.cosim.system import System
 from orchestrator.cosim.variables import Value, Variable
 from orchestrator.machine.errors import InputError, shortened
@@ -39,17 +39,17 @@ from orchestrator.machine.file_names import file_name, plain_file_names
 from orchestrator.machine.texts import literal
 from orchestrator.machine.user_files import read_archive
 
-#: The systems that a component is in, and its name there.
-Place: TypeAlias = tuple[Way, str]
+#: Names of the systems around a component, and its name in the innermost.
+Place: TypeAlias = tuple[SystemPath, str]
 
 
 class End(NamedTuple):
-    """An end of a line.
+    """An end of a connection in the file.
 
     Attributes:
-        element: None: it is at the border of the system itself.
+        element: None: a connector of the system itself.
         connector: of the element.
-        indices: of one element of an array; None: it is all of it, or a scalar.
+        indices: of an element of an array; None: a whole array, or a scalar.
 
     """
 
@@ -59,11 +59,11 @@ class End(NamedTuple):
 
 
 class Line(NamedTuple):
-    """A connection within one system.
+    """A connection in the file.
 
     Attributes:
         start, end: its ends.
-        connection: whose target it ends at; None: there is none.
+        connection: of the system, which ends with this line; None: the line is on the way.
 
     """
 
@@ -76,9 +76,9 @@ class Crossing(NamedTuple):
     """A connector of a system.
 
     Attributes:
-        kind: input or output.
-        component: whose port crosses the border there.
-        variable: that port, or an element of the array that it is.
+        kind: `input` or `output`.
+        component: with the port that crosses the border.
+        variable: the port, or an element of the array.
 
     """
 
@@ -89,11 +89,11 @@ class Crossing(NamedTuple):
 
 @dataclass
 class Nest:
-    """A system.
+    """A system in the file.
 
     Attributes:
         elements: components and systems in it, by their names there.
-        connectors: of its border, by their names.
+        connectors: of the system, by name.
         lines: connections within it.
 
     """
@@ -104,16 +104,16 @@ class Nest:
     _crossing: dict[PortName, str] = field(default_factory=dict)
 
     def inner(self, name: str) -> Nest:
-        """A system in it, which is made if it is not there."""
+        """Return a system in it, which is created if it is missing."""
         nest = self.elements.setdefault(name, Nest())
         assert isinstance(nest, Nest)
         return nest
 
     def cross(self, crossing: Crossing) -> tuple[str, bool]:
-        """The connector at which a port crosses the border, and whether it is a new one.
+        """Return the connector for a port that crosses the border, and True if it is new.
 
-        It is named after the port in all of the system: an identifier, as OMSimulator takes no
-        other, and one that no other system has, as it puts those of several systems into one.
+        Its name is that of the port in the whole system, as an identifier, since OMSimulator
+        accepts no other. It is unique, since OMSimulator merges the names of several systems.
         """
         port = PortName(crossing.component.name, crossing.variable.array)
         if port in self._crossing:
@@ -127,11 +127,11 @@ class Nest:
 
 
 def nested(system: System, offered: Iterable[Crossing] = ()) -> Nest:
-    """A system, nested as the names of its components say.
+    """Nest a system by the names of its components.
 
     Args:
-        system: it.
-        offered: what crosses the border of the outermost system.
+        system: to nest.
+        offered: connectors of the outermost system.
 
     """
     top = Nest()
@@ -153,7 +153,7 @@ def nested(system: System, offered: Iterable[Crossing] = ()) -> Nest:
 
 
 def offers(system: System) -> Iterator[Crossing]:
-    """What a system offers to one around it: all outputs, and inputs without feed or value."""
+    """Yield the connectors that a system can offer: all outputs, and open inputs."""
     for name, component in system.components.items():
         open_inputs = set(system.open_inputs(name))
         for causality in ("input", "output"):
@@ -165,7 +165,7 @@ def offers(system: System) -> Iterator[Crossing]:
 
 
 def order_of(nest: Nest) -> list[str]:
-    """The names of all components in the order in which they are nested."""
+    """Return the names of all components in the order in which they are nested."""
     found: list[str] = []
     for element in nest.elements.values():
         found += order_of(element) if isinstance(element, Nest) else [element.name]
@@ -173,9 +173,9 @@ def order_of(nest: Nest) -> list[str]:
 
 
 def _place(name: str, components: Collection[str]) -> Place:
-    """Where the name of a component puts it.
+    """Split the name of a component into its place.
 
-    A part without letters names no system, nor does one that is the name of another component.
+    A part without letters does not name a system, nor does the name of another component.
     """
     way: list[str] = []
     begin = 0
@@ -193,7 +193,7 @@ def _route(
     connection: Connection,
     is_whole: bool,
 ) -> None:
-    """Draw the lines of a connection, from the system of its source to the one of its target."""
+    """Add the lines of a connection, from the system of the source to the one of the target."""
     source, target = connection.source, connection.target
     component = system.component(source.component)
     variable = component.variable(source.port)
@@ -209,7 +209,7 @@ def _route(
 
 
 def _offer(top: Nest, place: Place, offer: Crossing) -> None:
-    """Draw the lines between a port and the border of the outermost system."""
+    """Add the lines between a port and the border of the outermost system."""
     way, local = place
     name, _ = top.cross(offer)
     border = End(None, name)
@@ -221,7 +221,7 @@ def _offer(top: Nest, place: Place, offer: Crossing) -> None:
 
 
 def _out(top: Nest, place: Place, crossing: Crossing, shared: int) -> End:
-    """Lead an output out of all systems that it is in but some; returns where it is then."""
+    """Lead an output out of its systems, except the shared ones, and return its end there."""
     way, local = place
     nests, end = _nests(top, way), End(local, crossing.variable.array)
     for depth in range(len(way), shared, -1):
@@ -232,8 +232,8 @@ def _out(top: Nest, place: Place, crossing: Crossing, shared: int) -> End:
     return end
 
 
-def _in(top: Nest, way: Way, start: End, crossing: Crossing, shared: int) -> End:
-    """Lead a value into all systems on a way but some; returns where it is then."""
+def _in(top: Nest, way: SystemPath, start: End, crossing: Crossing, shared: int) -> End:
+    """Lead a value into the systems of a way, except the shared ones, and return its end there."""
     nests = _nests(top, way)
     for depth in range(shared, len(way)):
         name, is_new = nests[depth + 1].cross(crossing)
@@ -243,14 +243,14 @@ def _in(top: Nest, way: Way, start: End, crossing: Crossing, shared: int) -> End
     return start
 
 
-def _shared(one: Way, other: Way) -> int:
-    """How many systems two ways share."""
+def _shared(one: SystemPath, other: SystemPath) -> int:
+    """Return the number of systems that two ways share."""
     same = (a == b for a, b in zip(one, other, strict=False))
     return next((n for n, is_same in enumerate(same) if not is_same), min(len(one), len(other)))
 
 
-def _nests(top: Nest, way: Way) -> list[Nest]:
-    """The systems on a way, the outermost first."""
+def _nests(top: Nest, way: SystemPath) -> list[Nest]:
+    """Return the systems of a way, from the outermost on."""
     found = [top]
     for part in way:
         found.append(found[-1].inner(part))
@@ -258,7 +258,7 @@ def _nests(top: Nest, way: Way) -> list[Nest]:
 
 
 def _indices(system: System, port: PortName) -> str | None:
-    """The place of an element in its array, as SSP 2.0 writes it; None: it is a scalar."""
+    """Return the indices of an element of an array, as in SSP 2.0; None: it is a scalar."""
     variable = system.component(port.component).variable(port.port)
     if not variable.shape:
         return None
@@ -268,7 +268,7 @@ def _indices(system: System, port: PortName) -> str | None:
 def _whole(
     connection: Connection, system: System, connected: Collection[Connection]
 ) -> set[Connection]:
-    """All connections between two arrays that are connected as a whole; empty: they are not."""
+    """Return all connections of two arrays that are connected as a whole; empty: they are not."""
     start, end = connection.source, connection.target
     starts, ends = system.component(start.component), system.component(end.component)
     source, target = starts.variable(start.port), ends.variable(end.port)
@@ -286,25 +286,25 @@ def _whole(
     return found if found.issubset(connected) else set()
 
 
-#: Libcosim and OMSimulator accept no other prefixes than these.
+#: Libcosim and OMSimulator accept no other prefixes.
 _PREFIXES = {"ssd": SSD, "ssc": SSC, "ssv": SSV, "osp": OSP, "oms": OMS}
 
-#: Whose annotations libcosim and ecos look for.
+#: Type of the annotations of libcosim and ecos.
 _LIBCOSIM = "com.opensimulationplatform"
 
-#: What marks annotations of this master.
+#: Type of our annotations.
 _OURS = "auv-fmu"
 
-#: Types of parameters that get no connectors.
+#: Types of parameters without connectors.
 _WITHOUT_CONNECTORS = ("String", "Enumeration")
 
-#: What XML 1.0 cannot hold.
+#: Characters that XML 1.0 cannot hold.
 _FORBIDDEN = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
-#: Where tools draw the components: size of a box, and the distance to the next.
+#: Layout in tools: size of a box, and gap to the next.
 _BOX, _GAP = (40.0, 60.0), 30.0
 
-#: The oldest time a zip archive can hold: the same system gives the same bytes.
+#: The earliest time in a zip archive, so that the same system gives the same bytes.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
@@ -332,13 +332,13 @@ def write_ssp(
 def ssp_bytes(
     system: System, flat: bool = False, connectors: bool = False, parameter_set: str = "scenario"
 ) -> bytes:
-    """Return the archive of a system: its structure and its FMUs, the same bytes every time.
+    """Return the archive of a system: its structure and its FMUs, always with the same bytes.
 
     Args:
         system: to write.
-        flat: for tools that know no systems in systems, or make one instance of an FMU only: names
-            have no dots, and each component has a copy of its FMU.
-        connectors: for tools that take it as one component: the system has connectors, of what it
+        flat: for tools without nested systems, or with one instance of an FMU only: names have no
+            dots, and each component has a copy of its FMU.
+        connectors: for tools that use it as one component: the system gets the connectors of
             :func:`offers`.
         parameter_set: name of every parameter set.
 
@@ -355,7 +355,7 @@ def ssp_bytes(
             )
             content.writestr(ZipInfo(source, _EPOCH), values)
         fmus = {sources[name]: component for name, component in system.components.items()}
-        # In the order of their paths, as before there were copies.
+        # Sorted by path, so that the archive's bytes do not depend on names.
         for source, component in sorted(fmus.items(), key=lambda one: one[1].fmu):
             fmu = read_archive(component.fmu, component.digest)
             content.writestr(ZipInfo(source, _EPOCH), fmu)
@@ -363,11 +363,11 @@ def ssp_bytes(
 
 
 def _sources(system: System, copied: bool = False) -> dict[str, str]:
-    """Where the archive has the FMU of each component.
+    """Return the path of each component's FMU in the archive.
 
     Args:
-        system: whose FMUs they are.
-        copied: whether each component has one of its own.
+        system: with the FMUs.
+        copied: if set, each component has a copy of its own.
 
     """
     names = system.fmus()
@@ -383,21 +383,21 @@ def _sources(system: System, copied: bool = False) -> dict[str, str]:
 
 
 def _parameter_sources(system: System) -> dict[str, str]:
-    """Where the archive has the parameter set of each component that has one."""
+    """Return the paths of the parameter sets in the archive, by component."""
     having = [name for name in system.components if system.parameters_of(name)]
     names = plain_file_names(f"{name}.ssv" for name in having)
     return {name: f"parameters/{file}" for name, file in zip(having, names, strict=True)}
 
 
 def parameter_set_xml(component: Component, values: Mapping[str, Value], name: str) -> bytes:
-    """Values of one component by the names of its variables, as an SSV."""
+    """Write values of a component as an SSV."""
     root = Element(_tag("ssv:ParameterSet"), name=name, version=_version(component))
     parameters = _add(root, "ssv:Parameters")
     for port in dict.fromkeys(component.variable(port).array for port in values):
         members = component.elements(port)
         element = _add(parameters, "ssv:Parameter", name=port)
         texts = [_text(component, member, values) for member in members]
-        # Choices are numbers, which OMSimulator takes and at which no other tool ends.
+        # Written as integers: OMSimulator reads them, and other tools accept them.
         is_choice = members[0].family == "Enumeration"
         value = _add(element, f"ssv:{'Integer' if is_choice else members[0].type}")
         if not members[0].shape or members[0].family != "String":
@@ -410,7 +410,7 @@ def parameter_set_xml(component: Component, values: Mapping[str, Value], name: s
 
 
 def _text(component: Component, variable: Variable, values: Mapping[str, Value]) -> str:
-    """A value as a parameter set has it."""
+    """Format a value for a parameter set."""
     value = values.get(variable.name, component.start(variable.name))
     if value is None:
         raise InputError(
@@ -438,14 +438,14 @@ def _add(parent: Element, tag: str, /, **attributes: str) -> Element:
 
 
 def serialised(root: Element, whose: str = "") -> bytes:
-    """An element as a file of XML.
+    """Format an element as an XML file.
 
     Args:
         root: the element.
-        whose: it is, for the message.
+        whose: element, for the message.
 
     Raises:
-        InputError: it holds a character that XML has no words for.
+        InputError: it contains a character that XML cannot hold.
 
     """
     _check_characters(root, whose)
@@ -471,13 +471,13 @@ def _check_characters(element: Element, where: str) -> None:
 def structure_xml(
     system: System, sources: Mapping[str, str] | None = None, connectors: bool = False
 ) -> bytes:
-    """SystemStructure.ssd; connectors and units come from the FMUs' own descriptions.
+    """Write SystemStructure.ssd, with connectors and units from the FMUs' descriptions.
 
-    libcosim and OMSimulator each need the step in an annotation of their own.
+    libcosim and OMSimulator need the step in different annotations.
 
     Args:
         system: to write.
-        sources: where the archive has the FMU of each component; None: each FMU once.
+        sources: path of each component's FMU in the archive; None: each FMU once.
         connectors: as of :func:`ssp_bytes`.
 
     """
@@ -508,14 +508,14 @@ def structure_xml(
 
 
 class _Given(NamedTuple):
-    """What all systems of a description are written from.
+    """Data for all systems of a description.
 
     Attributes:
-        system: all of it.
-        sources: of the FMUs of components.
-        parameter_sources: of the parameter sets of components.
+        system: to write.
+        sources: paths of the FMUs, by component.
+        parameter_sources: paths of the parameter sets, by component.
         units: that the description can define.
-        left_out: inputs that nothing feeds, and that have no connectors.
+        left_out: unconnected inputs without connectors.
 
     """
 
@@ -527,7 +527,7 @@ class _Given(NamedTuple):
 
 
 def _fill(structure: Element, nest: Nest, given: _Given) -> None:
-    """Write what is in a system, and in those in it; its element has its connectors already."""
+    """Write the contents of a system and of those in it; its connectors are there already."""
     system = given.system
     elements = _add(structure, "ssd:Elements")
     for position, (name, component) in enumerate(nest.elements.items()):
@@ -547,7 +547,7 @@ def _fill(structure: Element, nest: Nest, given: _Given) -> None:
         if component.name in system.steps:
             hint = str(system.steps[component.name])
             _add(_annotation(element, _LIBCOSIM), "osp:StepSizeHint", value=hint)
-    # The schema has no empty list of connections.
+    # The schema does not allow an empty list of connections.
     if nest.lines:
         connections = _add(structure, "ssd:Connections")
         for line in nest.lines:
@@ -555,7 +555,7 @@ def _fill(structure: Element, nest: Nest, given: _Given) -> None:
 
 
 def _add_border(structure: Element, nest: Nest, units: Collection[Unit]) -> None:
-    """The connectors of a system."""
+    """Write the connectors of a system."""
     if not nest.connectors:
         return
     connectors = _add(structure, "ssd:Connectors")
@@ -567,7 +567,7 @@ def _add_border(structure: Element, nest: Nest, units: Collection[Unit]) -> None
 
 
 def _clear_units(system: System) -> set[Unit]:
-    """The units that all FMUs define alike, with which values can be stated beside the FMUs."""
+    """Return the units that all FMUs define alike, so that the description can define them."""
     found: dict[str, set[Unit]] = {}
     for component in {part.fmu: part for part in system.components.values()}.values():
         for unit in component.description.unitDefinitions:
@@ -576,7 +576,7 @@ def _clear_units(system: System) -> set[Unit]:
 
 
 def _end(which: str, end: End) -> dict[str, str]:
-    """The attributes of an end of a connection, which may be an element of an array."""
+    """Return the attributes of an end of a connection, which may be an element of an array."""
     stated = {"Element": end.element, "Connector": end.connector, "Indices": end.indices}
     return {f"{which}{name}": text for name, text in stated.items() if text is not None}
 
@@ -588,7 +588,7 @@ def _add_line(connections: Element, line: Line, system: System) -> None:
         return
     source, made = line.connection.source, line.connection.transformation
     if made is not None:
-        # Where units differ, it has been made of them.
+        # The transformation includes the conversion of units.
         element.set("suppressUnitConversion", "true")
     if isinstance(made, Linear) and made != Linear():
         numbers = {"factor": str(made.factor), "offset": str(made.offset)}
@@ -596,7 +596,7 @@ def _add_line(connections: Element, line: Line, system: System) -> None:
     elif isinstance(made, Mapped) and made.pairs:
         fmi_type = system.component(source.component).variable(source.port).family
         of = bool if fmi_type == "Boolean" else int
-        # Numbers of an enumeration are integers as well.
+        # Items of an enumeration are also integers.
         name = "BooleanMapping" if of is bool else "IntegerMapping"
         table = _add(element, f"ssc:{name}Transformation")
         for before, after in made.pairs:
@@ -605,10 +605,10 @@ def _add_line(connections: Element, line: Line, system: System) -> None:
 
 
 def _add_master(structure: Element, step: float) -> None:
-    """The step, as OMSimulator looks for it: in Python the attributes, in C++ the child.
+    """Write the step for OMSimulator: attributes for its Python version, a child for C++.
 
-    Components without a solver of their own get the one of this name. The tolerances are its own
-    defaults: those that are missing it takes for zero.
+    Components without a solver of their own get the one of this name. The tolerances are
+    OMSimulator's defaults, since it takes missing ones for zero.
     """
     annotations = _add(_annotation(structure, "org.openmodelica"), "oms:Annotations")
     method = {"name": "oms_ma_default", "method": "oms_ma", "fixedStepSize": str(step)}
@@ -619,7 +619,7 @@ def _add_master(structure: Element, step: float) -> None:
 
 
 def _annotation(element: Element, of: str) -> Element:
-    """An annotation of an element, of some tool's."""
+    """Add an annotation of a tool to an element."""
     annotations = element.find(_tag("ssd:Annotations"))
     if annotations is None:
         annotations = _add(element, "ssd:Annotations")
@@ -627,7 +627,7 @@ def _annotation(element: Element, of: str) -> Element:
 
 
 def _version(component: Component) -> str:
-    """The first version of SSP that has words for the types of a component's ports."""
+    """Return the first version of SSP that supports the types of a component's ports."""
     return "1.0" if component.description.fmiVersion == "2.0" else "2.0"
 
 
@@ -645,9 +645,9 @@ def _add_component(
     written = set[str]()
     for variable in component.variables.values():
         name = variable.array
-        # OMSimulator knows no connectors of texts, libcosim none of enumerations, and fmpy feeds an
-        # input that no connection ends at from another's source. Parameter sets reach variables
-        # without a connector.
+        # OMSimulator does not support connectors of texts, libcosim none of enumerations, and
+        # fmpy feeds an unconnected input from the source of another one. Parameter sets reach
+        # variables without a connector.
         is_plain = variable.causality != "parameter" or variable.family not in _WITHOUT_CONNECTORS
         is_out = PortName(component.name, variable.name) in left_out or name in written
         if variable.causality in ("input", "output", "parameter") and is_plain and not is_out:
@@ -717,7 +717,7 @@ def _add_experiment(root: Element, system: System, order: Sequence[str]) -> None
         algorithm = _add(_annotation(experiment, _LIBCOSIM), "osp:Algorithm")
         _add(algorithm, "osp:FixedStepAlgorithm", baseStepSize=str(system.step))
     if system.left_open:
-        # Not beside the components: OMSimulator ends at an annotation there that it does not know.
+        # Not at the components, where OMSimulator fails on an unknown annotation.
         left_open = _add(_annotation(experiment, _OURS), LEFT_OPEN)
         for component, name in sorted((port.component, port.port) for port in system.left_open):
             _add(left_open, "Input", component=component, name=name)
