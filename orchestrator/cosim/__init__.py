@@ -8,20 +8,20 @@
     ending = simulate_plan(plan, [table])
     print(ending.failure or table["gain.y"][-1])
 
-It knows no component, and imports `orchestrator.machine` and nothing else of this product. What it
-offers is named here, imported on first use; the modules in it are private.
+It does not depend on any component, and imports only `orchestrator.machine` of this product. Its
+names are imported on first use; its modules are private.
 
 The loop, in :func:`.simulation.simulate_plan`::
 
     exchange initial values until they rest
-    tell the observers the first row
+    pass the first row to the observers
     for every step from t to t + h:
-        let hooks act whose time has come
-        for every stage of the schedule:
+        call the hooks that are due
+        for every stage of the step:
             gather the inputs of its components
             step each of them, then read their outputs
-        tell the observers the row
-        stop if an FMU has failed, or a signal says so
+        pass the row to the observers
+        stop if an FMU has failed, or a signal has arrived
 """
 
 from __future__ import annotations

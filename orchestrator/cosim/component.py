@@ -254,14 +254,14 @@ class Component:
     @property
     def takes_linear_inputs(self) -> bool:
         """True if it can go back to the beginning of a step and interpolate inputs."""
-        of = self.description.coSimulation
-        return bool(of.canGetAndSetFMUstate and of.canInterpolateInputs)
+        capabilities = self.description.coSimulation
+        return bool(capabilities.canGetAndSetFMUstate and capabilities.canInterpolateInputs)
 
     @property
     def gives_state(self) -> bool:
         """True if its whole state can be saved as bytes and restored."""
-        of = self.description.coSimulation
-        return bool(of.canGetAndSetFMUstate and of.canSerializeFMUstate)
+        capabilities = self.description.coSimulation
+        return bool(capabilities.canGetAndSetFMUstate and capabilities.canSerializeFMUstate)
 
     def variable(self, name: str) -> Variable:
         """Return one variable of the FMU.

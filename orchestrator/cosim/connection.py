@@ -163,7 +163,7 @@ def defined(component: Component, name: str) -> Unit:
     for unit in component.description.unitDefinitions:
         if unit.name == name and unit.baseUnit is not None:
             base: Any = unit.baseUnit
-            exponents = tuple(int(getattr(base, of, 0) or 0) for of in BASE_UNITS)
+            exponents = tuple(int(getattr(base, exponent, 0) or 0) for exponent in BASE_UNITS)
             return Unit(name, exponents, float(base.factor), float(base.offset))
     return Unit(name)
 
@@ -328,8 +328,8 @@ def can_feed(source: Variable, target: Variable) -> bool:
 def _check_transformed(connection: Connection, fmi_type: str) -> None:
     """Refuse to transform anything but numbers, and to make fractions of integers."""
     wire = f"{connection.source} -> {connection.target}"
-    of = TYPES[fmi_type]
-    is_real = of.family == "Real"
+    own = TYPES[fmi_type]
+    is_real = own.family == "Real"
     match connection.transformation:
         case Linear(factor, offset):
             if not is_real:
@@ -341,10 +341,11 @@ def _check_transformed(connection: Connection, fmi_type: str) -> None:
                     f"{wire}: the factor {factor:g} or the offset {offset:g} is not finite"
                 )
         case Mapped(pairs):
-            if of.family == "String":
+            if own.family == "String":
                 raise InputError(f"{wire}: a {fmi_type} cannot be mapped")
+            convert = float if is_real else int
             for _, value in pairs:
-                if not of.least <= value <= of.most or value != (float if is_real else int)(value):
+                if not own.least <= value <= own.most or value != convert(value):
                     shown = value if isinstance(value, int) else f"{value:.16g}"
                     raise InputError(
                         f"{wire}: is mapped to {shown}, which FMI type {fmi_type} cannot hold"

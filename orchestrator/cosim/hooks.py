@@ -70,6 +70,18 @@ class Run:
     due: int = NEVER
     happened: list[Occurrence] = field(default_factory=list)
 
+    def __post_init__(self) -> None:
+        """Make all hooks due before the first step."""
+        # By place: two hooks may be equal, or not hashable.
+        self._dues = [0] * len(self.hooks)
+
+    def call_hooks(self) -> None:
+        """Call the hooks that are due, in their order, and find when the next one is."""
+        for i, hook in enumerate(self.hooks):
+            if self._dues[i] <= self.made:
+                self._dues[i] = hook.act(self)
+        self.due = min(self._dues, default=NEVER)
+
     @property
     def time(self) -> float:
         """Time that the components have reached [s]."""
@@ -137,24 +149,6 @@ class Lasting(Protocol):
 
     def restore(self, state: Any) -> None:
         """Restore the state."""
-
-
-class Hooks:
-    """Calls hooks when they are due."""
-
-    def __init__(self, run: Run) -> None:
-        """Call all hooks of a run before the first step, in their order."""
-        self._run = run
-        # Found by place: two hooks may be equal, or not hashable.
-        self._due = [0] * len(run.hooks)
-
-    def act(self) -> None:
-        """Call the hooks that are due, and continue the run until the next one."""
-        run, due = self._run, self._due
-        for i, hook in enumerate(run.hooks):
-            if due[i] <= run.made:
-                due[i] = hook.act(run)
-        run.due = min(due, default=NEVER)
 
 
 #: Time on the clock between two looks at it, in steps [s].

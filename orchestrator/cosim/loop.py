@@ -10,7 +10,7 @@ from contextlib import suppress
 from ctypes import CDLL, POINTER, Structure, c_double, c_int, c_size_t, c_void_p
 from functools import cache, partial
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from fmpy import platform_tuple
@@ -59,27 +59,19 @@ _DUE, _FAILED = range(2)
 _GLANCE = 0.02
 
 
-class Steps(Protocol):
-    """Makes the steps of a run, as an iterator that yields whenever hooks may act."""
-
-    def __call__(self, run: Run) -> Iterator[None]:
-        """Make the remaining steps and count them; stop before a row that is not finite.
-
-        Yields:
-            None, whenever hooks may act: at the latest after as many steps as are due.
-
-        Raises:
-            ComponentFailed: the step after the yielded ones failed.
-            Ended: a component ends the run within that step.
-
-        """
-
-
 class Stepping(NamedTuple):
-    """A loop, with its name in records."""
+    """A loop that makes the steps of a run.
+
+    Attributes:
+        name: of the loop in records.
+        steps: makes the remaining steps and counts them; stops before a row that is not finite. It
+            yields whenever hooks may act: at the latest after as many steps as are due. It raises
+            ComponentFailed if the next step fails, and Ended if a component ends the run in it.
+
+    """
 
     name: str
-    steps: Steps
+    steps: Callable[[Run], Iterator[None]]
 
 
 def step_interpreted(run: Run) -> Iterator[None]:
@@ -166,7 +158,7 @@ class CFailure(Structure):
 
 
 def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
-    """Make the steps of a run with the compiled loop: see :class:`Steps`."""
+    """Make the steps of a run with the compiled loop: see :class:`Stepping`."""
     advance = library.advance
     advance.restype = c_int
     advance.argtypes = (

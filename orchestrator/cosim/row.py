@@ -145,7 +145,8 @@ class Row:
             The value and its source, in words; None: all values are right.
 
         """
-        fit = all(are_of(of, self.values[places]).all() for of, places in self._inputs.items())
+        inputs = self._inputs.items()
+        fit = all(are_of(fmi_type, self.values[places]).all() for fmi_type, places in inputs)
         if fit and np.isfinite(self.shown).all():
             return None
         ports = [port for component in components for port in self._ports[component]]

@@ -14,7 +14,7 @@ from orchestrator.cosim.experiment import OURS, Exchange
 from orchestrator.cosim.fmi.instance import ComponentFailed, Ended, Instance, Log
 from orchestrator.cosim.fmi.isolated import place_instances
 from orchestrator.cosim.fmi.surroundings import Surroundings, default_mode
-from orchestrator.cosim.hooks import Hook, Hooks, Run
+from orchestrator.cosim.hooks import Hook, Run
 from orchestrator.cosim.loop import PYTHON_LOOP, Stepping, choose_loop
 from orchestrator.cosim.observers import Blocks, Ending, Header, NotKept, Observer
 from orchestrator.cosim.plan import Plan
@@ -93,7 +93,7 @@ def simulate_plan(
             order = [name for names in coupling.plan.arrangement.stages for name in names]
             remark = None
             try:
-                failure = _advance(run, stepping, Hooks(run), order, surroundings)
+                failure = _advance(run, stepping, order, surroundings)
             except NotKept as error:
                 # A run whose rows cannot be kept stops.
                 failure = str(error)
@@ -159,17 +159,16 @@ def _units(system: System, columns: Iterable[PortName]) -> dict[str, str]:
 def _advance(
     run: Run,
     stepping: Stepping,
-    hooks: Hooks,
     order: Sequence[str],
     surroundings: Surroundings,
 ) -> str | None:
     """Step to the end or to the first failure, and return the failure."""
     blocks, failure = run.blocks, None
     try:
-        hooks.act()
+        run.call_hooks()
         for _ in stepping.steps(run):
             if run.made >= run.due:
-                hooks.act()
+                run.call_hooks()
             if monotonic() > blocks.due:
                 blocks.hand_over()
             if run.interrupts.numbers:

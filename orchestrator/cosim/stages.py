@@ -376,8 +376,8 @@ def _passing_first(
         for one in system.connections
         if place[one.source.component] >= place[one.target.component]
     }
-    # A component that takes an output with direct feedthrough before it passes must get the one that
-    # follows from the inputs of this step.
+    # A component that takes an output with direct feedthrough before it passes must get the output
+    # for the inputs of this step.
     late = {one.source.component for one in arrangement.late}
 
     def stepped(name: str) -> Visit:
@@ -513,9 +513,9 @@ def link_stages(
     """
     ring_of = {ring.names[0]: ring for ring in rings}
 
-    def closing(of: Close) -> Member:
-        close, ring = _CLOSES[of.how], ring_of[of.ring[0]]
-        return StageCall(lambda _t, _h: close(ring)).member
+    def closing(close: Close) -> Member:
+        function, ring = _CLOSES[close.how], ring_of[close.ring[0]]
+        return StageCall(lambda _t, _h: function(ring)).member
 
     def visiting(visit: Visit) -> Member:
         return _visiting(visit, instances[visit.component], system.components[visit.component])

@@ -262,17 +262,17 @@ class System:
             InputError: a name is not a port's, or the numbers of values and ports differ.
 
         """
-        found: dict[PortName, object] = {}
-        for said, values_of in sorted(values.items(), key=lambda one: STAR not in str(one[0])):
-            stated = said if isinstance(said, PortName) else self._port_name(str(said))
-            meant = self.meant(stated)
-            for name, value in zip(meant, _spread(stated, values_of, len(meant)), strict=True):
+        values_by_port: dict[PortName, object] = {}
+        for key, values_of in sorted(values.items(), key=lambda item: STAR not in str(item[0])):
+            stated = key if isinstance(key, PortName) else self._port_name(str(key))
+            names = self.meant(stated)
+            for name, value in zip(names, _spread(stated, values_of, len(names)), strict=True):
                 several = None if self.has(name) else _several(value)
                 ports = [] if several is None else self.members(str(name), ("parameter", "input"))
-                found |= (
+                values_by_port |= (
                     dict(self.paired(name, ports, several)) if several and ports else {name: value}
                 )
-        return found
+        return values_by_port
 
     @staticmethod
     def paired(

@@ -111,18 +111,18 @@ def same(wanted: Value, held: Value) -> bool:
 
 def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:
     """Return which numbers of a row fit a type; doubles and texts take all."""
-    of = TYPES[fmi_type]
-    if of.family == "Boolean":
+    own = TYPES[fmi_type]
+    if own.family == "Boolean":
         # FMI 2.0 uses integers for them.
-        of = TYPES["Integer"]
-    if of.c_type in (None, ctypes.c_double):
+        own = TYPES["Integer"]
+    if own.c_type in (None, ctypes.c_double):
         return np.ones(np.shape(numbers), dtype=bool)
     # As a double, the largest integer of 64 bits is the first number beyond the range.
-    fit = of.least <= numbers
-    fit &= numbers < float(of.most) if of.is_wide else numbers <= of.most
-    if of.family != "Real":
+    fit = own.least <= numbers
+    fit &= numbers < float(own.most) if own.is_wide else numbers <= own.most
+    if own.family != "Real":
         fit &= numbers == np.trunc(numbers)
-    if of.is_wide:
+    if own.is_wide:
         fit |= np.abs(numbers) >= _BEYOND
     return np.asarray(fit)
 

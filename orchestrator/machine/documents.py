@@ -1,4 +1,4 @@
-"""XML files of others, read leniently and safely."""
+"""XML files from other tools, read leniently and safely."""
 
 from __future__ import annotations
 

@@ -155,8 +155,8 @@ class PortBlock:
             self._values = (moved.c_type * n)()
         if moved.c_type not in _LOOKED_UP:
             # A byte of a Boolean may be neither 0 nor 1.
-            of = np.uint8 if moved.c_type is ctypes.c_bool else np.dtype(moved.c_type)
-            self._numbers = np.frombuffer(self._values, dtype=of)
+            dtype = np.uint8 if moved.c_type is ctypes.c_bool else np.dtype(moved.c_type)
+            self._numbers = np.frombuffer(self._values, dtype=dtype)
         # Prepared for ctypes: to convert them in every call takes a third of its time.
         count = c_size_t.from_param
         self._arguments = [byref(self._references), count(n_references), byref(self._values)]
@@ -360,7 +360,7 @@ class Instance(Protocol):
     def exchange(self) -> None:
         """Set all inputs, then read all outputs."""
 
-    def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
+    def derivatives(self, outputs: Sequence[str], known: str) -> Sequence[float]:
         """Return the derivatives of some outputs by one input at the same time.
 
         Raises:

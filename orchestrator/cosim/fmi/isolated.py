@@ -461,9 +461,9 @@ class IsolatedInstance:
         self._begin(_EXCHANGE, 0.0, 0.0)
         self._take_outputs()
 
-    def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
+    def derivatives(self, outputs: Sequence[str], known: str) -> Sequence[float]:
         """Return the derivatives of some outputs by one input at the same time."""
-        values = self._ask("derivatives", list(outputs), of)
+        values = self._ask("derivatives", list(outputs), known)
         self._check(isinstance(values, list) and len(values) == len(outputs))
         self._check(all(type(value) is float for value in values))
         return list(values)
@@ -677,11 +677,11 @@ class _Ports:
         self._typed: list[tuple[str, slice]] = []
         self._standing: list[tuple[int, ModelVariable, Standing]] = []
         n = 0
-        for name, of in TYPES.items():
+        for name, own in TYPES.items():
             ports = ports_of_type(component, causality, name)
-            if ports and of.family != "Real":
+            if ports and own.family != "Real":
                 self._typed.append((name, slice(n, n + len(ports))))
-            if of.stands:
+            if own.stands:
                 standing = Standing(name, strings)
                 self._standing += [(i, port, standing) for i, port in enumerate(ports, n)]
             n += len(ports)
@@ -709,7 +709,7 @@ class _Ports:
         held = zip(self._standing, values, strict=True)
         if not all(port.holds(value) for (_, port, _), value in held):
             raise ValueError("an output cannot have its value")
-        if not all(are_of(of, numbers[place]).all() for of, place in self._typed):
+        if not all(are_of(fmi_type, numbers[place]).all() for fmi_type, place in self._typed):
             raise ValueError("an output cannot have its value")
 
 

@@ -16,7 +16,7 @@ from shutil import copytree
 from tempfile import mkdtemp
 from threading import Lock
 from time import sleep
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import fmpy
 import numpy as np
@@ -77,8 +77,7 @@ from orchestrator.cosim.fmi.surroundings import restore_mode, within_folder
 from orchestrator.cosim.variables import TYPES, StringTable, Value
 from orchestrator.machine.errors import InputError, reason
 
-#: Functions that FMUs must have: those of FMI 2.0 without a capability, and those of FMI 3.0 in a
-#: run.
+#: Functions that FMUs must have: in FMI 2.0 without capabilities, in FMI 3.0 for a run.
 _NEEDED_IN_2 = re.compile(r"(?!.*(FMUstate|Derivative|Status|CancelStep|DebugLogging)).*")
 _NEEDED_IN_3 = re.compile(
     r"fmi3(InstantiateCoSimulation|FreeInstance|EnterInitializationMode|ExitInitializationMode|"
@@ -100,20 +99,6 @@ class Stepped(NamedTuple):
 
     do_step: int | None
     result: Any = None
-
-
-class Hearer(Protocol):
-    """Takes the messages of an instance.
-
-    Attributes:
-        name: of the instance.
-
-    """
-
-    name: str
-
-    def hear(self, status: int, message: str) -> None:
-        """Take a message."""
 
 
 class _Slave:
@@ -157,22 +142,22 @@ class _Slave:
         super().freeLibrary()  # type: ignore[misc]
         restore_mode()
 
-    def begin(self, hearer: Hearer) -> None:
+    def begin(self, instance: LoadedInstance) -> None:
         """Instantiate the FMU.
 
         Args:
-            hearer: takes its messages.
+            instance: takes its messages.
 
         Raises:
             Exception: it refuses.
 
         """
         self._environment = next(_environments)
-        _hearers[self._environment] = hearer
+        _instances[self._environment] = instance
         try:
             self._instantiate(self._environment)
         except Exception:
-            del _hearers[self._environment]
+            del _instances[self._environment]
             raise
 
     def _instantiate(self, environment: int) -> None:
@@ -182,7 +167,7 @@ class _Slave:
         """Free the instance; its library stays loaded."""
         # fmpy's freeInstance would also unload the library.
         self._call(f"{self.prefix}FreeInstance", self.component)
-        del _hearers[self._environment]
+        del _instances[self._environment]
 
     def function(self, name: str, types: Sequence[Any] | None = None) -> Callable[..., Any]:
         """Return one of the FMU's functions, for calls in every step.
@@ -379,8 +364,8 @@ def slave_class(component: Component) -> type[FMU2OfOthers | FMU3OfOthers]:
     return FMU3OfOthers if component.description.fmiMajorVersion == 3 else FMU2OfOthers
 
 
-#: Receivers of messages, by the environments that FMUs return with every message.
-_hearers: dict[int, Hearer] = {}
+#: Instances by the environments that FMUs return with every message.
+_instances: dict[int, LoadedInstance] = {}
 _environments = count(1)
 
 
@@ -388,21 +373,21 @@ _environments = count(1)
 def _log(
     environment: int | None, name: bytes, status: int, _: bytes, message: bytes | None
 ) -> None:
-    hearer = _hearers.get(environment or 0) or _bearing(name)
-    if hearer is not None:
-        hearer.hear(status, (message or b"").decode(errors="replace"))
+    instance = _instances.get(environment or 0) or _instance_of(name)
+    if instance is not None:
+        instance.hear(status, (message or b"").decode(errors="replace"))
 
 
 @fmi3LogMessageCallback  # type: ignore[untyped-decorator]
 def _log_of_fmi3(environment: int | None, status: int, _: bytes, message: bytes | None) -> None:
-    if (hearer := _hearers.get(environment or 0)) is not None:
-        hearer.hear(status, (message or b"").decode(errors="replace"))
+    if (instance := _instances.get(environment or 0)) is not None:
+        instance.hear(status, (message or b"").decode(errors="replace"))
 
 
-def _bearing(name: bytes | None) -> Hearer | None:
+def _instance_of(name: bytes | None) -> LoadedInstance | None:
     """Return the instance of a name: some FMUs do not return the environment."""
     text = (name or b"").decode(errors="replace")
-    return next((hearer for hearer in _hearers.values() if hearer.name == text), None)
+    return next((instance for instance in _instances.values() if instance.name == text), None)
 
 
 def _callbacks() -> fmi2CallbackFunctions:
@@ -618,10 +603,10 @@ class LoadedInstance:
                 raise self.failed(status, "exchanging values")
         restore_mode()
 
-    def derivatives(self, outputs: Sequence[str], of: str) -> Sequence[float]:
+    def derivatives(self, outputs: Sequence[str], known: str) -> Sequence[float]:
         """Return the derivatives of some outputs by one input at the same time."""
-        unknowns, knowns = self._arrays(outputs), self._arrays([of])
-        seed = [float(port == of) for ports in knowns for port in ports]
+        unknowns, knowns = self._arrays(outputs), self._arrays([known])
+        seed = [float(port == known) for ports in knowns for port in ports]
         values = self._call(
             "derivatives", self._references(unknowns), self._references(knowns), seed,
             sum(map(len, unknowns)),

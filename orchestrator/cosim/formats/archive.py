@@ -94,8 +94,8 @@ def violations(root: str, text: bytes) -> list[str]:
             _put_into_1_0(document)
         _schema(_SCHEMAS[root]).assertValid(document)
     except etree.LxmlError as error:
-        said = [(entry.line, entry.message) for entry in error.error_log]
-        return [f"line {line}: {re.sub('{[^}]*}', '', message)}" for line, message in said]
+        entries = [(entry.line, entry.message) for entry in error.error_log]
+        return [f"line {line}: {re.sub('{[^}]*}', '', message)}" for line, message in entries]
     return []
 
 
@@ -117,19 +117,19 @@ def _put_into_1_0(document: etree._Element) -> None:
         if name.localname in _ELEMENTS and parent is not None:
             parent.remove(element)
             continue
-        of = family_of(name.localname)
+        family = family_of(name.localname)
         # Annotations may contain text, and values of texts were on lines of their own.
-        element.tag, element.text = f"{{{name.namespace}}}{of}", None
+        element.tag, element.text = f"{{{name.namespace}}}{family}", None
         if parent is not None and etree.QName(parent).localname == "Parameter":
             # Lists are values of arrays.
             stated = element.get("value", "")
-            element.set("value", stated if of in _TEXTS else "".join(stated.split()[:1]))
+            element.set("value", stated if family in _TEXTS else "".join(stated.split()[:1]))
         for attribute, value in element.items():
             if attribute in _ATTRIBUTES:
                 del element.attrib[attribute]
             elif (attribute, value) in _VALUES or _LARGE.fullmatch(value):
                 element.set(attribute, _VALUES.get((attribute, value), "0"))
-        if of == "Component":
+        if family == "Component":
             element.set("source", element.get("source", ""))
 
 
@@ -169,8 +169,8 @@ class Archive:
 
     def problem(self, text: object) -> None:
         """Add a problem, which makes a run meaningless or impossible."""
-        said = str(text).removeprefix(f"{self.path}: ")
-        self.findings.problem(f"{self.path}: {said}")
+        shown = str(text).removeprefix(f"{self.path}: ")
+        self.findings.problem(f"{self.path}: {shown}")
 
     def note(self, text: object) -> None:
         """Add a note on a flaw that changes no number."""

@@ -73,7 +73,7 @@ def definitions_of(archive: Archive, root: Element, outer: Definitions) -> Defin
         if base is not None:
             units[name] = Unit(
                 name,
-                tuple(archive.integer(base, of) for of in BASE_UNITS),
+                tuple(archive.integer(base, exponent) for exponent in BASE_UNITS),
                 archive.number(base, "factor", 1.0),
                 archive.number(base, "offset", 0.0),
             )
@@ -378,9 +378,9 @@ class Builder:
         causality = connector.get("kind")
         for stated in connector:
             if stated.tag not in _NO_TYPES:
-                of = family_of(stated.tag)
+                family = family_of(stated.tag)
                 unit, items = self._definitions.unit(stated), self._definitions.items(stated)
-                return Connector(causality, of, unit, items)
+                return Connector(causality, family, unit, items)
         return Connector(causality)
 
 
@@ -669,7 +669,7 @@ class Bindings:
                         "the dimensions must be the same"
                     )
             for index, value in values_of.items():
-                reached = {node: (value, of) for node, of in element.named(name + index)}
+                reached = {node: (value, target) for node, target in element.named(name + index)}
                 given.update(reached)
                 if not reached:
                     unknown.append(name + index)
@@ -742,8 +742,9 @@ class Bindings:
                 continue
             if name in found:
                 self._archive.note(f"{where}: {name} appears twice in a parameter set")
-            of = known.unit(value), known.items(value)
-            found[name] = {i: Given(text, *of) for i, text in zip(indices, texts, strict=True)}
+            unit, items = known.unit(value), known.items(value)
+            pairs = zip(indices, texts, strict=True)
+            found[name] = {index: Given(text, unit, items) for index, text in pairs}
         return found
 
 

@@ -595,12 +595,12 @@ def _add_line(connections: Element, line: Line, system: System) -> None:
         _add(element, "ssc:LinearTransformation", **numbers)
     elif isinstance(made, Mapped) and made.pairs:
         fmi_type = system.component(source.component).variable(source.port).family
-        of = bool if fmi_type == "Boolean" else int
+        convert = bool if fmi_type == "Boolean" else int
         # Items of an enumeration are also integers.
-        name = "BooleanMapping" if of is bool else "IntegerMapping"
+        name = "BooleanMapping" if convert is bool else "IntegerMapping"
         table = _add(element, f"ssc:{name}Transformation")
         for before, after in made.pairs:
-            pair = {"source": literal(of(before)), "target": literal(of(after))}
+            pair = {"source": literal(convert(before)), "target": literal(convert(after))}
             _add(table, "ssc:MapEntry", **pair)
 
 
@@ -618,12 +618,12 @@ def _add_master(structure: Element, step: float) -> None:
     _add(information, "oms:FixedStepMaster", **master)
 
 
-def _annotation(element: Element, of: str) -> Element:
+def _annotation(element: Element, tool: str) -> Element:
     """Add an annotation of a tool to an element."""
     annotations = element.find(_tag("ssd:Annotations"))
     if annotations is None:
         annotations = _add(element, "ssd:Annotations")
-    return _add(annotations, "ssc:Annotation", type=of)
+    return _add(annotations, "ssc:Annotation", type=tool)
 
 
 def _version(component: Component) -> str:
@@ -702,9 +702,10 @@ def _add_units(root: Element, system: System) -> None:
     parent = _add(root, "ssd:Units")
     for name in sorted(units):
         base = _add(_add(parent, "ssc:Unit", name=name), "ssc:BaseUnit")
-        for attribute, otherwise in (*((of, 0) for of in BASE_UNITS), ("factor", 1), ("offset", 0)):
-            stated = getattr(units[name], attribute, otherwise)
-            if stated != otherwise:
+        for attribute in (*BASE_UNITS, "factor", "offset"):
+            default = 1 if attribute == "factor" else 0
+            stated = getattr(units[name], attribute, default)
+            if stated != default:
                 base.set(attribute, str(stated))
 
 
