@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim import (
-    Action,
     Alter,
     Event,
     Experiment,
@@ -22,7 +21,7 @@ from orchestrator.cosim import (
     Stop,
     Table,
 )
-from orchestrator.cosim.events import MOST_LISTED, occurrence
+from orchestrator.cosim.events import MOST_LISTED, Action, occurrence
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import Text
