@@ -117,11 +117,11 @@ class RowLog:
     def _different(self, content: bytes) -> int | None:
         """Return the index of the first number in the file that differs."""
         place = self._file.tell()
-        there = np.frombuffer(self._file.read(len(content)), np.uint64)
+        existing = np.frombuffer(self._file.read(len(content)), np.uint64)
         self._file.seek(place)
         # Compared bit for bit: zero is not minus zero.
-        changed = np.flatnonzero(there != np.frombuffer(content, np.uint64)[: len(there)])
-        self._after -= len(there) // self._width
+        changed = np.flatnonzero(existing != np.frombuffer(content, np.uint64)[: len(existing)])
+        self._after -= len(existing) // self._width
         return int(changed[0]) if len(changed) else None
 
     def kept(self) -> Iterator[np.ndarray]:
@@ -203,8 +203,8 @@ class Checkpoints:
             InputError: it cannot be read.
 
         """
-        found = _read(folder)
-        return None if found is None else found.every
+        stored = _read(folder)
+        return None if stored is None else stored.every
 
     def __init__(
         self,
@@ -239,24 +239,24 @@ class Checkpoints:
     def _look(self, resume: bool, force: bool) -> _Stored | None:
         """Return the existing checkpoint, from which the run continues."""
         try:
-            found = _read(self.folder)
+            stored = _read(self.folder)
             rows = self.folder / _ROWS
             # A process that was killed at its begin may have left an empty file of rows.
             is_empty = rows.is_file() and not rows.is_symlink() and not rows.stat().st_size
-            is_ours = found and (is_empty or begins(rows, found.identity))
+            is_ours = stored and (is_empty or begins(rows, stored.identity))
             if os.path.lexists(rows) and not is_ours:
                 raise InputError(
                     f"{rows} is not a file of a checkpoint; move it, choose another folder, or let "
                     "--force move it aside"
                 )
-            if found is None or found.time is None:
-                return found
+            if stored is None or stored.time is None:
+                return stored
             if not resume:
                 raise InputError(
-                    f"{self.folder} holds a checkpoint at t = {found.time:g} s: --resume continues "
-                    "from it; --force moves it aside and starts over"
+                    f"{self.folder} holds a checkpoint at t = {stored.time:g} s: --resume "
+                    "continues from it; --force moves it aside and starts over"
                 )
-            if different := differences(found.of, self._identity):
+            if different := differences(stored.of, self._identity):
                 raise InputError(
                     f"{self.folder} belongs to another run: {', '.join(different)} differ; resume "
                     "that run, or let --force move it aside and start over"
@@ -268,20 +268,20 @@ class Checkpoints:
                 if os.path.lexists(path):
                     move_aside(path)
             return None
-        return found
+        return stored
 
     def begin(self, header: Header) -> None:
         """Open the file of rows."""
         self._columns = ("time", *header.columns)
-        rows, width, found = self.folder / _ROWS, len(self._columns), self._found
-        if found is None or found.time is None:
+        rows, width, stored = self.folder / _ROWS, len(self._columns), self._found
+        if stored is None or stored.time is None:
             self._known, digest = 0, ""
             # The token is stored first, as a proof that the file of rows is ours.
             self.folder.mkdir(parents=True, exist_ok=True)
             self._store()
             rows.unlink(missing_ok=True)
         else:
-            self._known, digest = found.n_rows, found.rows
+            self._known, digest = stored.n_rows, stored.rows
         self._row_log = RowLog(rows, self._token, width, self._known, digest)
 
     def take(self, rows: np.ndarray) -> None:
@@ -303,10 +303,10 @@ class Checkpoints:
     def act(self, run: Run) -> int:
         """Write a checkpoint, or continue from one."""
         self._log = run.log
-        found, self._found = self._found, None
-        if found is not None and found.time is not None:
+        stored, self._found = self._found, None
+        if stored is not None and stored.time is not None:
             with _explained(self.folder / _STATE):
-                self._resume(run, found)
+                self._resume(run, stored)
         elif run.made:
             self._write(run)
         steps = max(round(min(self._every / run.experiment.step, NEVER)), 1)
@@ -314,8 +314,8 @@ class Checkpoints:
 
     def remove(self) -> None:
         """Remove the files that a finished run no longer needs."""
-        found, rows = _read(self.folder), self.folder / _ROWS
-        if found is not None and found.identity == self._token:
+        stored, rows = _read(self.folder), self.folder / _ROWS
+        if stored is not None and stored.identity == self._token:
             # The file with the token is removed last, as a proof that the rows are ours.
             self._store()
             if begins(rows, self._token):
@@ -353,9 +353,9 @@ class Checkpoints:
         content = _Stored(self._token, self._every, dict(self._identity), **more)
         write_whole(self.folder / _STATE, sealed(content._asdict()), self._partial)
 
-    def _resume(self, run: Run, found: _Stored) -> None:
+    def _resume(self, run: Run, stored: _Stored) -> None:
         # The meaning of rows is restored first: observers that get them need it.
-        for one, state in zip(_lasting(run), found.lasting, strict=True):
+        for one, state in zip(_lasting(run), stored.lasting, strict=True):
             one.restore(state)
         first = run.blocks.count  # computed again
         for rows in self._row_log.kept():
@@ -364,9 +364,9 @@ class Checkpoints:
             if run.interrupts:
                 raise KeyboardInterrupt
             first = 0
-        run.row.values[:] = found.row
+        run.row.values[:] = stored.row
         for name, instance in run.instances.items():
-            instance.restore(b64decode(found.states[name]))
+            instance.restore(b64decode(stored.states[name]))
 
 
 def _lasting(run: Run) -> list[Lasting]:

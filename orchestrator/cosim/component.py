@@ -110,7 +110,7 @@ def described(fmu: Path, folder: Path) -> Described:
         if version not in _VERSIONS:
             wanted = " or ".join(_VERSIONS)
             raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {wanted} are supported")
-        found = read_description(folder)
+        read = read_description(folder)
     except InputError:
         raise
     except KeyError as error:
@@ -118,24 +118,24 @@ def described(fmu: Path, folder: Path) -> Described:
         raise InputError(f"{fmu}: not a readable FMU: {why}") from error
     except Exception as error:
         raise InputError(f"{fmu}: not a readable FMU: {reason(error)}") from error
-    implementation = found.description.coSimulation
+    implementation = read.description.coSimulation
     if implementation is None:
-        scheduled = found.description.modelExchange is None
+        scheduled = read.description.modelExchange is None
         which = "scheduled execution" if scheduled else "model exchange"
         raise InputError(f"{fmu}: is for {which} only; only co-simulation is supported")
-    if found.description.guid is None:
+    if read.description.guid is None:
         raise InputError(f"{fmu}: not a readable FMU: its description has no guid")
     identifier = implementation.modelIdentifier
     if not re.fullmatch(r"[^/\\]+", identifier or ""):
         raise InputError(f"{fmu}: its model identifier {identifier!r} names no library")
-    if found.flaw is not None:
-        variables = found.description.modelVariables
+    if read.flaw is not None:
+        variables = read.description.modelVariables
         is_clear = len({variable.name for variable in variables}) == len(variables)
         if not is_clear or any(v.causality not in _CAUSALITIES for v in variables):
-            raise InputError(f"{fmu}: not a readable FMU: {reason(found.flaw)}")
+            raise InputError(f"{fmu}: not a readable FMU: {reason(read.flaw)}")
         for text in _misread(file):
             raise InputError(f"{fmu}: not a readable FMU: {text}")
-    return found
+    return read
 
 
 def _misread(file: Path) -> Iterator[str]:
@@ -207,11 +207,11 @@ class Component:
     @cached_property
     def arrays(self) -> dict[str, list[Variable]]:
         """Elements of each array, in their order."""
-        found: dict[str, list[Variable]] = {}
+        elements: dict[str, list[Variable]] = {}
         for variable in self.variables.values():
             if variable.shape:
-                found.setdefault(variable.array, []).append(variable)
-        return found
+                elements.setdefault(variable.array, []).append(variable)
+        return elements
 
     @cached_property
     def terminals(self) -> dict[str, Terminal]:
@@ -398,7 +398,7 @@ def read_component(
 
     """
     folder, digest = unpack(fmu)
-    found = described(fmu, folder)
-    if findings is not None and (remark := found.remark()):
+    read = described(fmu, folder)
+    if findings is not None and (remark := read.remark()):
         findings.note(f"{name}: the description of {fmu.name} is not valid: {remark}")
-    return Component(name, fmu, found.description, digest)
+    return Component(name, fmu, read.description, digest)

@@ -84,11 +84,11 @@ class Header:
         """Return the numeric columns of some rows, time first, all as doubles."""
         if not self.standing:
             return rows
-        found = rows[:, [0, *(self.place[name] for name in self.numeric_columns)]]
+        doubles = rows[:, [0, *(self.place[name] for name in self.numeric_columns)]]
         for i, name in enumerate(self.numeric_columns, 1):
             if name in self.standing:
-                found[:, i] = self.values(name, rows)
-        return found
+                doubles[:, i] = self.values(name, rows)
+        return doubles
 
     @property
     def encoders(self) -> dict[str, Callable[[Any], float]]:

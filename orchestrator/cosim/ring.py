@@ -73,16 +73,16 @@ class _Part:
     def changes(self) -> np.ndarray:
         """Return derivatives of its outputs by its inputs from differences: (sources, unknowns)."""
         values = self.row.values
-        found = np.zeros((len(self.sources), len(self.unknowns)))
+        derivatives = np.zeros((len(self.sources), len(self.unknowns)))
         here = values[self.sources]
         for i, (column, variable) in enumerate(zip(self.unknowns, self.inputs, strict=True)):
             held = values[column]
             values[column] = _near(held, variable)
             self.exchange()
-            found[:, i] = (values[self.sources] - here) / (values[column] - held)
+            derivatives[:, i] = (values[self.sources] - here) / (values[column] - held)
             values[column] = held
         self.exchange()
-        return found
+        return derivatives
 
     def derivatives(self) -> np.ndarray:
         """Return derivatives of its outputs by its inputs, from the FMU or from differences."""
@@ -269,12 +269,12 @@ class Ring:
     def _derivative(self) -> np.ndarray:
         """Return the derivative of the Real inputs minus the values that arrive there."""
         n = len(self._targets)
-        found = np.zeros((n, n))
+        matrix = np.zeros((n, n))
         factors = np.concatenate([gather.factors for gather in self._inner])
         for part in self._parts:
-            found[part.block] = part.derivatives()
+            matrix[part.block] = part.derivatives()
         real = self._reals
-        return np.asarray((np.eye(n) - factors[:, np.newaxis] * found)[real])
+        return np.asarray((np.eye(n) - factors[:, np.newaxis] * matrix)[real])
 
     def _step(
         self, held: np.ndarray, arriving: np.ndarray, derivative: np.ndarray, tries: int
@@ -344,8 +344,8 @@ def _differ(
     # numpy's isclose takes longer than the FMUs. The check of the row reports values that are not
     # finite.
     relative, absolute = by
-    found: np.ndarray = np.abs(arriving - held) > absolute + relative * np.abs(held)
-    return found
+    differ: np.ndarray = np.abs(arriving - held) > absolute + relative * np.abs(held)
+    return differ
 
 
 def _is_real(system: System, connection: Connection) -> bool:

@@ -37,14 +37,15 @@ Sources = Mapping[str, Collection[str]]
 def without_rings(sources: Sources) -> dict[str, set[str]]:
     """Open all rings: in a ring, each component waits for the one before it."""
     place = {name: i for i, name in enumerate(sources)}
-    found: dict[str, set[str]] = {}
+    opened_sources: dict[str, set[str]] = {}
     for part in strongly_connected(sources):
         before: set[str] = set()
         ring = set(part)
         for name in opened(part, sources, place):
-            found[name] = {source for source in sources[name] if source not in ring} | before
+            outer = {source for source in sources[name] if source not in ring}
+            opened_sources[name] = outer | before
             before = {name}
-    return {name: found[name] for name in sources}
+    return {name: opened_sources[name] for name in sources}
 
 
 def in_levels(sources: Sources, last: Collection[str]) -> list[str]:
@@ -300,14 +301,14 @@ class System:
         """Return the ports or groups that match a name with stars, or else the name itself."""
         for like, port in PortName.splits(str(name)) if STAR in str(name) else ():
             starts = tuple(port + mark for mark in _MEMBER)
-            found = [
+            names = [
                 PortName(one, port)
                 for one, component in self.components.items()
                 if _is_like(one, like)
                 and any(v == port or v.startswith(starts) for v in component.variables)
             ]
-            if found:
-                return found
+            if names:
+                return names
         return [name]
 
     def _port_name(self, text: str) -> PortName:
@@ -325,14 +326,14 @@ class System:
         for component, group in PortName.splits(text):
             if component in self.components:
                 starts = tuple(group + mark for mark in _MEMBER)
-                found = [
+                ports = [
                     PortName(component, variable.name)
                     for causality in causalities
                     for variable in self.components[component].having(causality)
                     if variable.name.startswith(starts)
                 ]
-                if found:
-                    return found
+                if ports:
+                    return ports
         return []
 
     def named(self, name: PortName) -> PortName:
@@ -361,10 +362,10 @@ class System:
 
     @cached_property
     def _parameters(self) -> dict[str, dict[str, Value]]:
-        found: dict[str, dict[str, Value]] = {}
+        by_component: dict[str, dict[str, Value]] = {}
         for target, value in self.parameters.items():
-            found.setdefault(target.component, {})[target.port] = value
-        return found
+            by_component.setdefault(target.component, {})[target.port] = value
+        return by_component
 
     def changed(self, *types: str) -> dict[PortName, Value]:
         """Return parameters that differ from their FMUs' own values; of some types, or of all."""
@@ -378,18 +379,18 @@ class System:
     @cached_property
     def feeding(self) -> dict[str, list[Connection]]:
         """Connections that end at each component."""
-        found: dict[str, list[Connection]] = {name: [] for name in self.components}
+        by_target: dict[str, list[Connection]] = {name: [] for name in self.components}
         for connection in self.connections:
-            found.setdefault(connection.target.component, []).append(connection)
-        return found
+            by_target.setdefault(connection.target.component, []).append(connection)
+        return by_target
 
     @cached_property
     def fed(self) -> dict[str, list[Connection]]:
         """Connections that begin at each component."""
-        found: dict[str, list[Connection]] = {name: [] for name in self.components}
+        by_source: dict[str, list[Connection]] = {name: [] for name in self.components}
         for connection in self.connections:
-            found.setdefault(connection.source.component, []).append(connection)
-        return found
+            by_source.setdefault(connection.source.component, []).append(connection)
+        return by_source
 
     def fmus(self, *taken: str) -> dict[Path, str]:
         """Return all FMUs, each with a unique file name that is not taken."""
@@ -605,12 +606,12 @@ class System:
 
     def _sources(self, among: Collection[str] | None = None) -> dict[str, set[str]]:
         counted = (name for name in self.components if among is None or name in among)
-        found: dict[str, set[str]] = {name: set() for name in counted}
+        sources: dict[str, set[str]] = {name: set() for name in counted}
         for connection in self.connections:
             source, target = connection.source.component, connection.target.component
-            if source in found and target in found and self.has_feedthrough(connection):
-                found[target].add(source)
-        return found
+            if source in sources and target in sources and self.has_feedthrough(connection):
+                sources[target].add(source)
+        return sources
 
     def reaching(self, component: str, until: set[str]) -> Iterator[Connection]:
         """Yield the connections through which values reach a component, directly or through others.
@@ -655,9 +656,9 @@ class System:
             for variable in component.having("input"):
                 groups.setdefault(variable.name.rpartition(".")[0], []).append(variable)
             for group, members in groups.items():
-                found = [v for v in members if PortName(name, v.name) not in taken]
-                if not group or len(found) < len(members):
-                    labels += [f"{name}.{variable.name}" for variable in found]
+                unfed = [v for v in members if PortName(name, v.name) not in taken]
+                if not group or len(unfed) < len(members):
+                    labels += [f"{name}.{variable.name}" for variable in unfed]
                     continue
                 labels.append(f"{name}.{group}.*")
                 # A source of the same inputs of another component belongs to that one.
@@ -686,7 +687,7 @@ class System:
             InputError: a component's step is not a multiple of it.
 
         """
-        found = dict.fromkeys(self.components, 1)
+        decimations = dict.fromkeys(self.components, 1)
         for name, own in self.steps.items():
             self.component(name)
             number = isinstance(own, Real) and not isinstance(own, bool)
@@ -698,8 +699,8 @@ class System:
                     f"{name} needs steps of {own:g} s, which are not a multiple of the "
                     f"communication step of {step:g} s"
                 )
-            found[name] = n
-        return found
+            decimations[name] = n
+        return decimations
 
     def with_common_step(self) -> System:
         """Return the system with the longest step that divides the steps of all components.

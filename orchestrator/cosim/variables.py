@@ -146,10 +146,10 @@ class StringTable:
 
     def number(self, text: str) -> int:
         """Return the number of a text; a new text gets the next one."""
-        found = self._numbers.setdefault(text, len(self._texts))
-        if found == len(self._texts):
+        number = self._numbers.setdefault(text, len(self._texts))
+        if number == len(self._texts):
             self._texts.append(text)
-        return found
+        return number
 
     def text(self, number: float) -> str:
         """Return the text of a number.
@@ -519,11 +519,11 @@ def _starts(array: Variable) -> list[str]:
 
 def references_of(variables: Sequence[Variable]) -> list[int]:
     """Return the value references of variables, one for all elements of an array."""
-    found, place = [], 0
+    references, place = [], 0
     while place < len(variables):
-        found.append(variables[place].reference)
+        references.append(variables[place].reference)
         place += prod(variables[place].shape)
-    return found
+    return references
 
 
 def complete(description: ModelDescription, root: ElementTree.Element) -> None:

@@ -336,22 +336,22 @@ class Builder:
         """Add notes where connectors differ from their FMU."""
         absent = []
         elements = {name for stated in leaf.connectors.values() for name in stated.elements}
-        known = leaf.component.unsupported if leaf.component else {}
+        unsupported = leaf.component.unsupported if leaf.component else {}
         for name, stated in leaf.connectors.items():
             own = leaf.connector(name)
-            if name in known or (own is not None and name in elements):
+            if name in unsupported or (own is not None and name in elements):
                 continue
             if own is None:
                 absent.append(name)
                 continue
-            for what, said, true in (
+            for what, value, true in (
                 ("kind", stated.causality, own.causality),
                 ("type", stated.type, own.type),
                 ("unit", stated.unit and stated.unit.name, own.unit and own.unit.name),
             ):
-                if said and said != true:
+                if value and value != true:
                     self._archive.note(
-                        f"{Node(leaf.way, name)}: its {what} is {said}, but {true} in its FMU"
+                        f"{Node(leaf.way, name)}: its {what} is {value}, but {true} in its FMU"
                     )
         if absent:
             self._archive.note(
@@ -360,7 +360,7 @@ class Builder:
             )
 
     def _connectors(self, content: Element) -> dict[str, Connector]:
-        found: dict[str, Connector] = {}
+        connectors: dict[str, Connector] = {}
         for connector in content.findall("Connectors/Connector"):
             name, stated = connector.get("name", ""), self._connector(connector)
             elements: tuple[str, ...] = ()
@@ -371,8 +371,11 @@ class Builder:
                 # For a component, the FMU decides.
                 if content.tag != "Component":
                     self._archive.problem(f"{content.get('name', '')}.{name} {error}")
-            found |= {name: replace(stated, elements=elements), **dict.fromkeys(elements, stated)}
-        return found
+            connectors |= {
+                name: replace(stated, elements=elements),
+                **dict.fromkeys(elements, stated),
+            }
+        return connectors
 
     def _connector(self, connector: Element) -> Connector:
         causality = connector.get("kind")
@@ -488,18 +491,18 @@ def segments_of(archive: Archive, top: SystemElement) -> dict[Node, Segment]:
 
     A wrong connection is a problem of the archive.
     """
-    found: dict[Node, Segment] = {}
+    segments: dict[Node, Segment] = {}
     for group in top.elements():
         if isinstance(group, SystemElement):
             for connection in group.content.findall("Connections/Connection"):
                 try:
-                    _add(found, group, connection)
+                    _add(segments, group, connection)
                 except InputError as error:
                     archive.problem(error)
-    return found
+    return segments
 
 
-def _add(found: dict[Node, Segment], group: SystemElement, connection: Element) -> None:
+def _add(segments: dict[Node, Segment], group: SystemElement, connection: Element) -> None:
     start, end = (_End.of(group, connection, which) for which in ("start", "end"))
     named = f"{start.node} -> {end.node}"
     if (start.takes and end.takes) or (start.gives and end.gives):
@@ -516,11 +519,11 @@ def _add(found: dict[Node, Segment], group: SystemElement, connection: Element) 
     unit, converts = target.connector.unit, _converts_units(connection)
     for index in source.indices:
         begin, stop = source.element(index), target.element(index)
-        if (before := found.get(stop)) is not None:
+        if (before := segments.get(stop)) is not None:
             raise InputError(
                 f"{stop} is fed by {before.source} and by {begin}; an input takes one connection"
             )
-        found[stop] = Segment(begin, unit, stated, converts)
+        segments[stop] = Segment(begin, unit, stated, converts)
 
 
 @dataclass(frozen=True)
@@ -693,10 +696,10 @@ class Bindings:
             return None
         source = element.get("source")
         if source is None:
-            found = element.find(inline)
-            if found is None:
+            content = element.find(inline)
+            if content is None:
                 self._archive.note(f"{where}: a <{element.tag}> without content")
-            return found
+            return content
         base = None
         if element.get("sourceBase", "SSD") != "SSD":
             if not isinstance(owner, ComponentElement) or owner.component is None:
@@ -710,20 +713,20 @@ class Bindings:
         self, parameters: dict[str, _Elements], mapping: Element, where: str
     ) -> dict[str, _Elements]:
         """Return the parameters in a mapping, under their new names."""
-        found = {}
+        renamed = {}
         for entry in mapping.findall("MappingEntry"):
             source, target = (
                 self._archive.required(entry, end, where) for end in ("source", "target")
             )
             if source in parameters:
                 values = parameters[source].items()
-                found[target] = {index: replace(given, entry=entry) for index, given in values}
-        return found
+                renamed[target] = {index: replace(given, entry=entry) for index, given in values}
+        return renamed
 
     def _parameters(self, values: Element, where: str) -> dict[str, _Elements]:
         """Return the values of a parameter set by name."""
-        known = definitions_of(self._archive, values, self._definitions)
-        found: dict[str, _Elements] = {}
+        definitions = definitions_of(self._archive, values, self._definitions)
+        parameters: dict[str, _Elements] = {}
         for parameter in values.findall("Parameters/Parameter"):
             name = self._archive.required(parameter, "name", where)
             value = next(iter(parameter), None)
@@ -740,12 +743,12 @@ class Bindings:
             if len(texts) != len(indices):
                 self._archive.problem(f"{where}: {name}: {len(texts)} values for {len(indices)}")
                 continue
-            if name in found:
+            if name in parameters:
                 self._archive.note(f"{where}: {name} appears twice in a parameter set")
-            unit, items = known.unit(value), known.items(value)
+            unit, items = definitions.unit(value), definitions.items(value)
             pairs = zip(indices, texts, strict=True)
-            found[name] = {index: Given(text, unit, items) for index, text in pairs}
-        return found
+            parameters[name] = {index: Given(text, unit, items) for index, text in pairs}
+        return parameters
 
 
 def _texts(value: Element, is_array: bool) -> list[str]:

@@ -166,10 +166,10 @@ def offers(system: System) -> Iterator[Crossing]:
 
 def order_of(nest: Nest) -> list[str]:
     """Return the names of all components in the order in which they are nested."""
-    found: list[str] = []
+    names: list[str] = []
     for element in nest.elements.values():
-        found += order_of(element) if isinstance(element, Nest) else [element.name]
-    return found
+        names += order_of(element) if isinstance(element, Nest) else [element.name]
+    return names
 
 
 def _place(name: str, components: Collection[str]) -> Place:
@@ -251,10 +251,10 @@ def _shared(one: SystemPath, other: SystemPath) -> int:
 
 def _nests(top: Nest, way: SystemPath) -> list[Nest]:
     """Return the systems of a way, from the outermost on."""
-    found = [top]
+    nests = [top]
     for part in way:
-        found.append(found[-1].inner(part))
-    return found
+        nests.append(nests[-1].inner(part))
+    return nests
 
 
 def _indices(system: System, port: PortName) -> str | None:
@@ -275,7 +275,7 @@ def _whole(
     if not source.shape or source.shape != target.shape:
         return set()
     members = zip(starts.elements(source.array), ends.elements(target.array), strict=True)
-    found = {
+    connections = {
         replace(
             connection,
             source=PortName(start.component, a.name),
@@ -283,7 +283,7 @@ def _whole(
         )
         for a, b in members
     }
-    return found if found.issubset(connected) else set()
+    return connections if connections.issubset(connected) else set()
 
 
 #: Libcosim and OMSimulator accept no other prefixes.
@@ -371,15 +371,15 @@ def _sources(system: System, copied: bool = False) -> dict[str, str]:
 
     """
     names = system.fmus()
-    taken, found = list(names.values()), dict[str, str]()
+    taken, sources = list(names.values()), dict[str, str]()
     first: dict[Path, str] = {}
     for name, component in system.components.items():
         file = names[component.fmu]
         if first.setdefault(component.fmu, name) != name and copied:
             [file] = plain_file_names([f"{name}.fmu"], *taken)
             taken.append(file)
-        found[name] = f"resources/{file}"
-    return found
+        sources[name] = f"resources/{file}"
+    return sources
 
 
 def _parameter_sources(system: System) -> dict[str, str]:
@@ -458,10 +458,10 @@ def serialised(root: Element, whose: str = "") -> bytes:
 
 def _check_characters(element: Element, where: str) -> None:
     for value in element.attrib.values():
-        if (found := _FORBIDDEN.search(value)) is not None:
+        if (match := _FORBIDDEN.search(value)) is not None:
             place = _FORBIDDEN.sub("?", where) or "the system"
             raise InputError(
-                f"{place}: {shortened(value)!r} holds the character {found[0]!r}, which XML cannot "
+                f"{place}: {shortened(value)!r} holds the character {match[0]!r}, which XML cannot "
                 "hold"
             )
     for child in element:
@@ -568,11 +568,11 @@ def _add_border(structure: Element, nest: Nest, units: Collection[Unit]) -> None
 
 def _clear_units(system: System) -> set[Unit]:
     """Return the units that all FMUs define alike, so that the description can define them."""
-    found: dict[str, set[Unit]] = {}
+    units_by_name: dict[str, set[Unit]] = {}
     for component in {part.fmu: part for part in system.components.values()}.values():
         for unit in component.description.unitDefinitions:
-            found.setdefault(unit.name, set()).add(defined(component, unit.name))
-    return {unit for units in found.values() if len(units) == 1 for unit in units}
+            units_by_name.setdefault(unit.name, set()).add(defined(component, unit.name))
+    return {unit for units in units_by_name.values() if len(units) == 1 for unit in units}
 
 
 def _end(which: str, end: End) -> dict[str, str]:
