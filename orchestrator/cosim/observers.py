@@ -57,7 +57,7 @@ class Header:
     strings: StringTable = field(default_factory=StringTable, compare=False, repr=False)
 
     #: Types whose values are not all doubles: texts, and integers of 64 bits.
-    TYPES: ClassVar[frozenset[str]] = frozenset(name for name, of in TYPES.items() if of.stands)
+    TYPES: ClassVar[frozenset[str]] = frozenset(name for name, kind in TYPES.items() if kind.stands)
 
     @cached_property
     def place(self) -> Mapping[str, int]:
@@ -74,26 +74,31 @@ class Header:
         """The columns that do not hold texts."""
         return tuple(name for name in self.columns if self.types.get(name) != "String")
 
+    @cached_property
+    def exact_columns(self) -> tuple[str, ...]:
+        """The columns that do not hold doubles."""
+        return tuple(name for name in self.columns if name in self.types)
+
     def values(self, column: str, rows: np.ndarray) -> np.ndarray:
         """Return a column of some rows: texts of a String, integers of 64 bits, else doubles."""
         numbers = rows[:, self.place[column]]
-        standing = self.standing.get(column)
+        standing = self._standing.get(column)
         return numbers if standing is None else standing.values(numbers)
 
     def numeric(self, rows: np.ndarray) -> np.ndarray:
         """Return the numeric columns of some rows, time first, all as doubles."""
-        if not self.standing:
+        if not self.exact_columns:
             return rows
         doubles = rows[:, [0, *(self.place[name] for name in self.numeric_columns)]]
         for i, name in enumerate(self.numeric_columns, 1):
-            if name in self.standing:
+            if name in self.types:
                 doubles[:, i] = self.values(name, rows)
         return doubles
 
     @property
     def encoders(self) -> dict[str, Callable[[Any], float]]:
         """Functions that turn values, or their texts, into numbers of a row, by column."""
-        return {name: standing.number for name, standing in self.standing.items()}
+        return {name: standing.number for name, standing in self._standing.items()}
 
     def every(self, interval: float | None) -> Every | None:
         """Return an object that chooses times for an interval [s]; None: all are kept."""
@@ -103,13 +108,9 @@ class Header:
         return Every(interval, self.experiment.start_time)
 
     @cached_property
-    def standing(self) -> dict[str, Standing]:
+    def _standing(self) -> dict[str, Standing]:
         """Decoding of the columns that do not hold doubles."""
-        return {
-            name: Standing(self.types[name], self.strings)
-            for name in self.columns
-            if name in self.types
-        }
+        return {name: Standing(self.types[name], self.strings) for name in self.exact_columns}
 
 
 class Occurrence(NamedTuple):
@@ -633,7 +634,7 @@ class CsvFile(TableFile):
 
         """
         lines = rows.tolist()
-        for name in self._header.standing:
+        for name in self._header.exact_columns:
             place = self._header.place[name]
             for line, value in zip(lines, self._header.values(name, rows).tolist(), strict=True):
                 line[place] = value
@@ -688,12 +689,9 @@ class ParquetFile(TableFile):
         self._arrow: Any = import_module("pyarrow")
         self._header = header
         kinds = [self._arrow.float64()] * (1 + len(header.columns))
-        for name, standing in header.standing.items():
-            kinds[header.place[name]] = (
-                self._arrow.string()
-                if standing.c_type is None
-                else self._arrow.from_numpy_dtype(np.dtype(standing.c_type))
-            )
+        for name in header.exact_columns:
+            fmi_type = header.types[name]
+            kinds[header.place[name]] = getattr(self._arrow, fmi_type.lower())()
         self._schema = self._arrow.schema(list(zip(("time", *header.columns), kinds, strict=True)))
         self._output = _Output(self._path)
         self._file = BufferedWriter(self._output)
@@ -722,7 +720,7 @@ class ParquetFile(TableFile):
 
     def _write(self, rows: np.ndarray) -> None:
         columns = [self._arrow.array(column) for column in rows.T]
-        for name in self._header.standing:
+        for name in self._header.exact_columns:
             place, values = self._header.place[name], self._header.values(name, rows)
             columns[place] = self._arrow.array(values, self._schema.types[place])
         self._writer.write_batch(self._arrow.record_batch(columns, schema=self._schema))
