@@ -1,4 +1,4 @@
-"""A run that was ended and resumed has the rows of one that was not."""
+"""A resumed run has the same rows as a run without interruption."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def parts(folder: Path, **how: bool) -> System:
 
 def run(system: System, stop_time: float, *checkpoints: Checkpoints) -> Table:
     table = Table()
-    # They come first: what others are told, they can tell again.
+    # Checkpoints come first, since they repeat the rows for other observers.
     plan = make_plan(system, Experiment(stop_time, STEP))
     simulate_plan(plan, [*checkpoints, table], hooks=checkpoints)
     return table
@@ -60,7 +60,7 @@ def test_what_is_there_is_neither_overwritten_nor_mistaken(tmp_path: Path):
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
     forced = Checkpoints(folder, OURS, 0.375, resume=False, force=True)
     assert forced.time is None
-    # What was there has another name now.
+    # Existing files are moved to another name.
     assert {path.read_bytes() for path in folder.iterdir()} == set(before.values())
 
 
@@ -91,7 +91,7 @@ def digest(kept: int) -> str:
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
-    """A file of all rows, and of a part of one more."""
+    """A file of complete rows and a part of the next."""
     path = tmp_path / "rows.bin"
     row_log = RowLog(path, ID, 3)
     for block in np.split(ROWS, [1, 513, 9000]):
@@ -107,7 +107,7 @@ def read(path: Path) -> np.ndarray:
 
 
 @pytest.mark.parametrize("kept", [1, 4096, 4097, 10_000])
-def test_rows_that_count_are_read_again_and_gone_on_with(path: Path, kept: int):
+def test_valid_rows_are_read_again_and_continued(path: Path, kept: int):
     row_log = RowLog(path, ID, 3, kept, digest(kept))
     assert np.vstack(list(row_log.kept())).tobytes() == ROWS[:kept].tobytes()
     assert row_log.append(ROWS[kept:]) is None

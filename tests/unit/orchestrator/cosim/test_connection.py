@@ -81,7 +81,7 @@ def test_units_of_different_things_are_refused():
     ],
 )
 def test_units_too_far_apart_for_a_number_are_refused_by_name(large, small):
-    """A value would arrive as zero, infinite, or with a few of its digits."""
+    """A value would arrive as zero, infinite, or with only some of its digits."""
     for source, target in ((large, small), (small, large)):
         with pytest.raises(InputError, match=f"units {source.name} and {target.name} are too far"):
             conversion(source, target)
@@ -142,5 +142,5 @@ def test_what_tables_come_to_is_bounded():
 def test_transformations_that_no_number_holds_do_not_follow_each_other(size):
     with pytest.raises(InputError, match="successive linear transformations combine to"):
         combine(Linear(size), Linear(size))
-    # A factor of zero says what it does.
+    # A factor of zero is an intended one.
     assert combine(Linear(size), Linear(0.0, 1.0)) == Linear(0.0, 1.0)

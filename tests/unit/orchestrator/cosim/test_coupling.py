@@ -26,7 +26,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def coupled(folder: Path, wires, coupling: str | None = None, steps=(), **functions):
-    """The coupling of such components before the start, the values of the row, and the log."""
+    """Coupling of such components before the start, the values of the row, and the log."""
     system = static_system(folder, list(functions), wires)
     system = replace(system, steps=dict(steps))
     instances = {name: Static(name, function) for name, function in functions.items()}
@@ -88,7 +88,7 @@ def test_a_ring_that_cannot_be_solved_is_delayed_or_refused_by_name(folder, part
     assert mentions(str(error.value), "solve a b.y")
 
 
-def test_what_is_not_finite_or_was_refused_does_not_start(folder):
+def test_a_run_does_not_start_with_infinite_or_refused_values(folder):
     with pytest.raises(StartError) as refused:
         coupled(folder, {"b.u": "a.y"}, a=lambda u, v: (np.inf, 0.0), b=given_on)[0].initialise()
     assert mentions(str(refused.value), "a.y inf")

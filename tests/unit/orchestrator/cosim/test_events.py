@@ -1,4 +1,4 @@
-"""Events on signals: when they act, one upon the other, and again after they were remembered."""
+"""Events on signals: their times, their order, and their state after a resumption."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ STEPS = EXPERIMENT.rows - 1
 
 
 class Component:
-    """Holds a parameter and notes what it is asked for."""
+    """Holds a parameter and records calls."""
 
     def __init__(self, stubborn: bool = False) -> None:
         self.gain, self.stubborn, self.asked = 1.0, stubborn, []
@@ -63,7 +63,7 @@ class Component:
 
 
 class Trial:
-    """A run of one output that feeds an input, and of an input that nothing feeds."""
+    """A run with an output that feeds an input, and an unconnected input."""
 
     def __init__(self, events, sources, stubborn=False):
         self.sources, self.events, self.component = sources, Events(events), Component(stubborn)
@@ -94,7 +94,7 @@ class Trial:
         self.due = 0
 
     def step(self):
-        """Attend if it is due, and make a step; what both inputs and the parameter are in it."""
+        """Call the hook if it is due, make a step, and return its inputs and parameter."""
         run = self.run
         run.time = EXPERIMENT.time(run.made)
         if self.due <= run.made:
@@ -107,7 +107,7 @@ class Trial:
         return seen
 
     def remember(self):
-        """As a run that is resumed does."""
+        """Save and restore the state, like a resumed run."""
         fresh = Events(self.events._events)
         fresh.restore(json.loads(json.dumps(self.events.state())))
         self.events, self.due = fresh, self.run.made
@@ -138,14 +138,14 @@ def bias(value, target=FED):
 def test_it_acts_from_the_first_instant_that_its_time_is_not_after():
     values, trial = seen([event(override(-1.0), at=1.3, lasts=1.0)])
     expected = np.arange(STEPS + 0.0)
-    # 1.3 s lies in the third step of 0.5 s, and 1 s later two steps have passed.
+    # 1.3 s is within the third step of 0.5 s, and 1 s later two steps have passed.
     expected[3:5] = -1.0
     np.testing.assert_array_equal(values[:, 0], expected)
     assert [(one.time, one.label) for one in trial.run.happened] == [(1.5, "it"), (2.5, "")]
 
 
 @pytest.mark.parametrize("k", range(STEPS))
-def test_a_time_that_is_an_instant_but_for_rounding_is_that_instant(k):
+def test_a_time_within_rounding_of_an_instant_is_that_instant(k):
     values, _ = seen([event(override(-1.0), at=0.1 * (5 * k))])
     assert list(values[:, 0] == -1.0).index(True) == k
 
@@ -176,7 +176,7 @@ def test_what_is_frozen_keeps_what_it_was_last():
     assert set(values[:, 1]) == {7.0}
 
 
-def test_release_ends_all_that_alters_a_signal():
+def test_release_ends_all_changes_of_a_signal():
     events = [
         event(override(-1.0), at=1.0),
         event(bias(2.0), at=1.5),
@@ -188,7 +188,7 @@ def test_release_ends_all_that_alters_a_signal():
     assert list(values[:7, 1]) == [7, 7, 7, -2, -2, 7, 7]
 
 
-def test_what_is_set_is_what_is_altered():
+def test_a_change_applies_to_a_value_that_is_set():
     events = [
         event(bias(0.5, FREE), at=1.0, lasts=2.0),
         event(Set((), ((FREE, 3.0),)), at=2.0, lasts=2.0),
@@ -203,7 +203,7 @@ def test_a_parameter_that_is_not_taken_ends_the_run():
         trial.step()
 
 
-def test_a_component_begins_anew_with_the_parameters_that_it_has():
+def test_a_component_restarts_with_its_present_parameters():
     _, trial = seen([event(Set(((GAIN, 3.0),), ()), at=1.0), event(Reset(("a",)), at=2.0)])
     values = {"gain": 3.0, "other": 2.0}
     entered = ("enter", values, 2.0)
@@ -217,7 +217,7 @@ def test_a_stop_ends_the_run():
         trial.step()
 
 
-def test_a_condition_that_chatters_is_not_listed_for_ever():
+def test_a_condition_that_chatters_is_listed_a_limited_number_of_times():
     chatter = Event("x", bias(1.0), "x", when=Condition(OUT, ">", 0.0), repeat=True)
     events, run = Events([chatter]), Trial([], np.zeros(STEPS + 1)).run
     run.experiment = Experiment(1e5, 0.5)
@@ -245,7 +245,7 @@ happenings = st.lists(st.tuples(kinds, st.integers(-5, 5), moments, durations), 
 
 @given(happenings, st.sets(st.integers(0, STEPS - 1), max_size=3))
 def test_of_several_the_latest_acts_and_then_the_one_before(wanted, resumed):
-    """Whether the run was resumed in between or not."""
+    """With or without a resumption in between."""
     h = EXPERIMENT.step
     events = [
         event(Alter(kind, ((FED, float(value)), (FREE, float(value)))), at=at * h,

@@ -1,4 +1,4 @@
-"""t_k = k h, and the stop time is the last."""
+"""Communication points are t_k = k h; the stop time is the last."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def test_steps_follow_each_other_and_end_at_the_stop_time(step, n, rest):
 @example(1.7e308, 1.7e308)
 @example(5e8 + 0.6, 1.0)
 @example(1e7, 0.01)
-def test_the_number_of_steps_is_that_of_exact_arithmetic(stop_time, step):
-    """Two neighbouring answers where the quotient is a whole number but for rounding."""
+def test_the_number_of_steps_follows_exact_arithmetic(stop_time, step):
+    """Two neighbouring answers are allowed where only rounding prevents a whole number."""
     exact = Fraction(stop_time) / Fraction(step)
     if exact > MOST_STEPS:
         with pytest.raises(InputError, match="more than"):
@@ -63,7 +63,7 @@ def test_the_number_of_steps_is_that_of_exact_arithmetic(stop_time, step):
 @example(1e308, -1e308, 1e-3)
 @example(float("inf"), 0.0, 0.02)
 def test_any_time_is_reached_after_some_steps_or_never(time, start, step):
-    """Never is after more steps than any run has."""
+    """Never means after more steps than any run has."""
     stop = max(start + step, float(np.nextafter(start, np.inf)))
     reached = Experiment(stop, stop - start, start_time=start).reaching(time)
     assert 0 <= reached <= MOST_STEPS + 1
@@ -71,7 +71,7 @@ def test_any_time_is_reached_after_some_steps_or_never(time, start, step):
         assert time <= start + 1e-3 * (stop - start)
 
 
-def test_a_rest_within_rounding_is_no_step():
+def test_a_rest_within_rounding_is_not_a_step():
     assert Experiment(0.3, 0.1).rows == 4
     assert Experiment(1.0, 0.03).rows == 35
 
@@ -87,7 +87,7 @@ def test_a_number_beyond_all_floats_is_refused():
         Experiment(10**400, 0.1)
 
 
-def test_text_is_no_time():
+def test_text_is_not_a_time():
     with pytest.raises(InputError, match="must be numbers, not '3'"):
         Experiment("3", 0.1)  # type: ignore[arg-type]
 

@@ -1,4 +1,4 @@
-"""A clock sets the pace of a run, and what it is late by is measured."""
+"""A clock limits the speed of a run, whose lateness is measured."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class World:
         return SimpleNamespace(experiment=experiment, made=made, blocks=self.blocks, interrupts=[])
 
     def advance(self, clock: RealTime, run: SimpleNamespace, costs: list[float]) -> list[float]:
-        """Make steps that take so long, and say when the clock let each call go [s]."""
+        """Make steps of given durations, and return the times after the calls of the clock [s]."""
         let_go = []
         begun, due = self.now, 0
         for cost in [*costs, 0.0]:
@@ -54,7 +54,7 @@ def test_steps_end_when_the_clock_says_so(monkeypatch, factor):
     let_go = world.advance(clock, run, [0.01, 0.0, 0.02, 0.01])
     np.testing.assert_allclose(let_go, np.arange(5) * 0.25 / factor, atol=1e-9)
     assert clock.lateness.worst < 1e-9
-    # Rows are told meanwhile.
+    # Rows are handed over during a wait.
     assert world.told >= int(1.0 / factor / 0.25) - 1
 
 
@@ -96,7 +96,7 @@ def test_who_stops_a_run_does_not_wait(monkeypatch):
 
 
 @given(st.lists(st.floats(0.0, 100.0), min_size=1, max_size=300))
-def test_lateness_is_that_of_a_list(seconds):
+def test_lateness_equals_the_statistics_of_a_list(seconds):
     late = Lateness()
     for one in seconds:
         late.take(one)

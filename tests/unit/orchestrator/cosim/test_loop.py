@@ -1,4 +1,4 @@
-"""Which loop makes the steps, and that the one in Python makes them one after the other."""
+"""The choice of the loop, and the steps of the Python loop."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_stages_come_one_after_the_other_and_slow_ones_when_they_are_due():
     assert run.rows == [[0.5, 0.5, 0, 0], [1, 1, 0.5, 0], [1.5, 1.5, 1, 1], [2, 2, 1.5, 1.5]]
 
 
-def test_a_row_shows_what_has_passed_and_then_components_are_stepped():
+def test_a_row_shows_passed_values_and_then_components_are_stepped():
     run = made(99.0, Experiment(2.0, 0.5))
     step, show = run.stages
     run.stages, run.passing = [step], [show._replace(decimation=Decimation(2))]
@@ -60,14 +60,14 @@ def test_a_row_shows_what_has_passed_and_then_components_are_stepped():
 
 @pytest.mark.parametrize("width", [3, 4_096, 4_097, 20_000])
 def test_a_row_that_is_not_finite_is_not_kept(width: int):
-    """Long rows are looked through in another way."""
+    """Long rows are tested in another way."""
     run = made(1.5, Experiment(2.0, 0.5), width)
     list(step_interpreted(run))
     assert run.made == len(run.rows) == 2
     assert np.isnan(run.row.values[0])
 
 
-def test_a_run_goes_on_after_the_steps_that_were_made():
+def test_a_run_continues_after_the_steps_that_were_made():
     run = made(99.0, Experiment(2.0, 0.5))
     run.made = 2
     list(step_interpreted(run))
@@ -76,7 +76,7 @@ def test_a_run_goes_on_after_the_steps_that_were_made():
 
 @pytest.fixture
 def library(monkeypatch: pytest.MonkeyPatch) -> object:
-    """Compiled already."""
+    """A library that is already compiled."""
     found = object()
     monkeypatch.setattr(loop, "load_stepper", lambda: found)
     return found

@@ -87,12 +87,12 @@ def test_values_of_a_step_belong_to_the_time_at_which_it_began():
 def test_steps_keep_their_times_where_rows_were_left_out():
     thinned = table([0.0, 0.1, 1.0, 1.1, 2.0])
     np.testing.assert_allclose(thinned.step_start, [0.0, 0.9, 1.0, 1.9])
-    # The row before 1.0 is not there: its own values stand in, a step later.
+    # The row before 1.0 is missing: the values of the row itself are used, a step later.
     np.testing.assert_allclose(thinned.start_values("a.t")[:, 0], [0.0, 1.0, 1.0, 2.0])
 
 
-def test_without_a_lag_values_of_a_step_stand_in_the_row_of_its_time():
-    """The last row begins no step; where rows were left out, each has its own time."""
+def test_without_a_lag_the_row_of_a_time_shows_the_values_of_its_step():
+    """The last row begins no step; after left-out rows each row has its own time."""
     for times in ([0.0, 0.1, 0.2, 0.3], [0.0, 0.1, 1.0, 1.1, 2.0]):
         whole = table(times, "feedthrough")
         assert whole.step_start.tolist() == times[:-1]
@@ -133,7 +133,7 @@ def test_what_is_written_is_read_again_exactly(tmp_path: Path, ending: str):
 
 
 def test_parquet_of_the_same_rows_is_the_same_file(tmp_path: Path):
-    """However long its observer had to wait for them."""
+    """In blocks of any size."""
     pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     rows = np.random.default_rng(1).normal(size=(20_000, 2))
     files = []

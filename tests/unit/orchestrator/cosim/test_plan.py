@@ -1,4 +1,4 @@
-"""Which component is stepped when, what cannot be run, and what makes a run another one."""
+"""Stages and decimations of a plan, systems that cannot be run, and the identity of a run."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ CHAIN, STATES, RING = (
 
 @pytest.fixture(scope="module")
 def relays(tmp_path_factory: pytest.TempPathFactory):
-    """Systems of three relays that are wired so."""
+    """Systems of three connected relays."""
     path = relay(tmp_path_factory.mktemp("relay"))
     return lambda wires: system_of(dict.fromkeys("abc", path), wires)
 
@@ -57,7 +57,7 @@ def relays(tmp_path_factory: pytest.TempPathFactory):
         (CHAIN, "cba", ["cba"]),
         (CHAIN, "acb", ["ac", "b"]),
         (STATES, "gauss-seidel", ["abc"]),
-        # A feedthrough that comes late waits for nobody.
+        # A late feedthrough does not wait.
         (RING, "gauss-seidel", ["ac", "b"]),
     ],
 )
@@ -92,7 +92,8 @@ def test_what_opens_a_ring_is_said(relays):
     [
         (CHAIN, "gauss-seidel", False, [[], ["b.u"], ["c.u"]]),
         (CHAIN, "jacobi", False, [["b.u", "c.u"], [], []]),
-        # A state must be taken before anybody advances, unless the latest is wanted.
+        # A state must be taken before any component is stepped, unless the latest values are
+        # wanted.
         (STATES, "gauss-seidel", False, [["b.u", "c.u"], [], []]),
         (STATES, "gauss-seidel", True, [[], ["b.u"], ["c.u"]]),
     ],
@@ -115,12 +116,12 @@ def test_a_solved_ring_gathers_by_itself(relays):
     ("steps", "experiment", "word"),
     [({}, replace(EXPERIMENT, order=("a", "b")), "c"), ({"b": 0.2}, EXPERIMENT, "b")],
 )
-def test_what_cannot_be_run_is_refused_by_name(relays, steps, experiment, word):
+def test_impossible_systems_are_refused_by_name(relays, steps, experiment, word):
     with pytest.raises(InputError, match=word):
         make_plan(replace(relays(CHAIN), steps=steps), experiment)
 
 
-def test_a_step_of_a_component_is_a_number_of_those_of_the_run(relays):
+def test_a_step_of_a_component_is_a_multiple_of_the_step_of_the_run(relays):
     system = replace(relays(CHAIN), steps={"b": 0.25})
     assert make_plan(system, EXPERIMENT).decimations == {"a": 1, "b": 2, "c": 1}
 
@@ -146,7 +147,7 @@ choices = st.randoms(use_true_random=False)
 
 @dataclass
 class Choice:
-    """What an example draws: something out of several, and a number."""
+    """Random choices of an example."""
 
     random: Random
     number: float
@@ -212,7 +213,7 @@ def longer_steps(system: System, choice: Choice) -> System:
 
 
 def another_field(run: Prepared, choice: Choice) -> Prepared:
-    """Any, also one that nobody has thought of here."""
+    """Any field, including future ones."""
     experiment = copy(run.experiment)
     field = choice.random.choice(fields(Experiment))
     object.__setattr__(experiment, field.name, ("another", choice.number))

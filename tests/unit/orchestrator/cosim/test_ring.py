@@ -1,4 +1,4 @@
-"""Rings come to the values that solve them, however steep they are, and without a step."""
+"""Rings converge to their solution, however steep they are, without a step."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def ring_of(folder: Path, wires=BACK, kind: str = "Real", **functions: Function):
-    """A ring of a and b, fed by any others, its row, and the instances of all."""
+    """A ring of a and b, with other components that feed it, its row, and all instances."""
     system = static_system(folder, list(functions), wires, kind)
     instances = {name: Static(name, function) for name, function in functions.items()}
     row = Row(system, instances)
@@ -65,7 +65,7 @@ def test_a_linear_ring_comes_to_the_solution_of_its_equations(folder, slopes, of
     exact = np.linalg.solve(np.eye(2) - A @ B, A @ q + p)
     found = [value(row, "a.y"), value(row, "a.z")]
     assert found == pytest.approx(exact, rel=1e-6, abs=1e-6)
-    # The last step of Newton's method is one of rounding errors.
+    # The last step of Newton's method consists of rounding errors.
     assert [value(row, "b.u"), value(row, "b.v")] == pytest.approx(found, rel=1e-9, abs=1e-9)
 
 
@@ -109,7 +109,7 @@ def test_a_ring_without_a_solution_is_refused_with_its_ports(folder, kind, funct
     assert mentions(str(error.value), "a.u")
 
 
-def test_a_ring_is_closed_anew_only_where_something_has_changed(folder):
+def test_a_ring_is_closed_again_only_after_a_change(folder):
     wires = {**BACK, "a.v": "c.y"}
     ring, row, instances = ring_of(
         folder, wires,

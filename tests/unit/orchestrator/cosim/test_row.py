@@ -1,4 +1,4 @@
-"""The row of all values: where each stands, how they get there, and what none can be."""
+"""The row of all values: its layout, its gathering, and values that are refused."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from support.texts import mentions
 
 
 class Tied(SimpleNamespace):
-    """An instance that remembers what of the row is its own."""
+    """An instance that records its part of the row."""
 
     def tie(self, values, parts, strings) -> None:
         self.values, self.parts = values, parts
@@ -52,12 +52,12 @@ def test_ports_of_one_causality_and_type_are_neighbours(system: System):
             ("input", slice(0, 2)), ("input", slice(2, 3)), ("input", slice(3, 4)),
             ("output", slice(4, 5)),
         ]  # fmt: skip
-        # A view: what an instance writes stands in the row.
+        # The part is a view: an instance writes into the row.
         instances[name].values[4] = 7.0 + k
     assert [row.values[row.columns[PortName(name, "y")]] for name in "ab"] == [7.0, 8.0]
 
 
-def test_inputs_start_with_what_their_description_says_and_what_is_set(system: System):
+def test_inputs_start_with_values_of_the_description_or_the_system(system: System):
     values = {PortName.read("a.u"): 5.0, PortName.read("a.v"): nan, PortName.read("b.k"): 1.0}
     row, _ = made(system.with_parameters({PortName.read("a.u"): 5.0}))
     row.enter(values)
@@ -85,7 +85,7 @@ def test_hidden_outputs_are_shown_when_they_are_copied(system: System):
         ({}, None),
         ({"a.y": nan}, "a.y nan"),
         ({"a.y": inf, "b.u": inf}, "a.y inf"),
-        # Nothing is wrong with what feeds it: it overflows on its way.
+        # The source is right: the value overflows on its way.
         ({"b.u": -inf}, "b.u -inf a.y"),
         ({"a.v": nan}, "a.v nan table"),
         ({"b.n": 2.5}, "b.n 2.5 Integer"),
@@ -109,7 +109,7 @@ def test_ports_that_move_are_those_that_change_by_more_than_rounding(system: Sys
     assert row.moving(before) == [PortName.read("b.v")]
 
 
-def test_places_are_those_of_both_ends_of_each_connection(system: System):
+def test_places_are_the_columns_of_both_ends_of_each_connection(system: System):
     row, _ = made(system)
     targets, sources = row.places(system.connections)
     np.testing.assert_array_equal(targets, [row.columns[PortName.read("b.u")]])
@@ -120,7 +120,7 @@ OUT, FED, ALSO, FREE = (PortName("a", name) for name in ("out", "fed", "also", "
 
 
 class FourValues(SimpleNamespace):
-    """Four values: an output, two inputs that it feeds, and one that nothing feeds."""
+    """Four values: an output, two inputs that it feeds, and an unconnected input."""
 
     def __init__(self, out: float, free: float = 7.0) -> None:
         values = np.array([out, 0.0, 0.0, free])
@@ -145,7 +145,7 @@ def gathered(out: float, free: float = 7.0, transformation=None):
 
 @pytest.mark.parametrize("is_plain", [True, False])
 @pytest.mark.parametrize("value", [0.0, -0.0, 1.5, -1e308, 5e-324, math.inf])
-def test_what_nobody_alters_arrives_bit_for_bit(value, is_plain):
+def test_values_without_a_change_arrive_bit_for_bit(value, is_plain):
     row, gather, _ = gathered(value)
     gather.is_plain = is_plain
     row.values[1:3] = math.nan
@@ -153,7 +153,7 @@ def test_what_nobody_alters_arrives_bit_for_bit(value, is_plain):
     assert row.values[1:3].tobytes() == np.array([value, value]).tobytes()
 
 
-def test_an_input_alone_is_altered_and_released():
+def test_a_single_input_is_altered_and_released():
     row, gather, signals = gathered(3.0)
     signals.bias(FED, 0.5)
     gather(row.values)
@@ -178,7 +178,7 @@ def test_an_input_that_nothing_feeds_gets_back_what_it_had():
     assert row.values[3] == 7.0
 
 
-def test_what_is_supplied_is_altered_as_what_is_fed():
+def test_supplied_values_are_altered_like_fed_ones():
     row, _, signals = gathered(3.0)
     signals.bias(FREE, 1.0)
     signals.supply(FREE, 4.0)

@@ -1,4 +1,4 @@
-"""A run from its first row to its end, of small FMUs whose motion is known."""
+"""Runs of small FMUs with known motion, from the first row to the end."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ EXPERIMENT = Experiment(1.0, 0.125)
 
 @pytest.fixture(scope="module")
 def system(tmp_path_factory: pytest.TempPathFactory) -> System:
-    """A sine, and a part that doubles it at once."""
+    """A sine, and a component that doubles it with direct feedthrough."""
     fmu = linear(tmp_path_factory.mktemp("linear"))
     parts = {"double": Part(D=[[0, 0], [2, 0]]), "sine": SINE}
     return system_of(dict.fromkeys(parts, fmu), parts, {"double.u0": "sine.y0"})
 
 
 class Watching:
-    """An observer that notes what it is told, and may fail at the beginning."""
+    """An observer that records its calls, and may fail at the beginning."""
 
     def __init__(self, told: list[object], fails: bool = False) -> None:
         self.told, self.fails = told, fails
@@ -47,13 +47,13 @@ class Watching:
         self.told.append(ending)
 
 
-def test_rows_are_those_of_the_solution_from_the_start_to_the_end(system: System):
+def test_rows_show_the_solution_from_the_start_to_the_end(system: System):
     table = Table()
     ending = simulate_plan(make_plan(system, EXPERIMENT), [table])
     assert (ending.failure, ending.messages, len(table)) == (None, (), 9)
     np.testing.assert_array_equal(table.time, 0.125 * np.arange(9))
     np.testing.assert_allclose(table["sine.y0"], np.sin(table.time), atol=1e-12)
-    # What follows from a state takes it as it is at the same time.
+    # An output of a state shows the state of the same time.
     np.testing.assert_allclose(table["double.y1"], 2.0 * np.sin(table.time), atol=1e-12)
 
 

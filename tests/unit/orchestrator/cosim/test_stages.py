@@ -1,4 +1,4 @@
-"""The stages of a step: which values move, what components do then, and by which calls."""
+"""The stages of a step: moved values, the work of components, and their calls."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory):
         (LOOP, PLAIN, "jacobi", None, [
             "law.u law.v plant.u meter.u: law plant meter path",
         ]),
-        # Each takes what has just been computed, and states of t_k before one is stepped.
+        # Each component takes values that were just computed, and states of t_k before a step.
         (LOOP, PLAIN, "gauss-seidel", None, [
             "law.v meter.u: meter path",
             "law.u: law",
@@ -61,7 +61,7 @@ def fmus(tmp_path_factory: pytest.TempPathFactory):
         ], [
             ": meter(step only states) path law(step only states) plant",
         ]),
-        # It takes its input at every second step, and is shown when it has made its own.
+        # It takes its input at every second step, and is shown after its own step.
         (LOOP, SLOW, "jacobi", None, [
             "2 meter.u:",
             "law.u law.v plant.u: law plant path",
@@ -120,7 +120,7 @@ def test_stages_of_four_components_in_a_loop(fmus, wires, steps, order, passing,
 
 
 def told(stage: Stage) -> str:
-    """A stage in words; a component that takes its inputs, makes a step and is read by its name."""
+    """Describe a stage; a component with all of its work has only its name."""
     when = "" if stage.decimation is None else f"{stage.decimation.every} "
     when += "end " if stage.decimation and stage.decimation.at_end else ""
     if stage.shows:
@@ -141,12 +141,12 @@ def how(visit: Visit) -> str:
 def test_a_slow_component_is_stepped_at_the_beginning_and_shown_at_the_end():
     begins, ends = Decimation(3), Decimation(3, at_end=True)
     assert [k for k in range(8) if begins.is_due(k, 8)] == [0, 3, 6]
-    # Also where the run ends within its step.
+    # Even if the run ends within its step.
     assert [k for k in range(8) if ends.is_due(k, 8)] == [2, 5, 7]
 
 
 def test_in_feedthrough_order_each_value_is_moved_as_often_as_it_is_needed(tmp_path):
-    """All pass something on; only the plant's state is taken before it has passed it on itself."""
+    """All components pass values on; only the plant's state is taken before that."""
     fmus = dict.fromkeys(("plant", "meter", "law"), relay(tmp_path))
     wires = {"law.u": "plant.y", "plant.u": "law.g", "meter.u": "law.g"}
     system = system_of(fmus, wires)

@@ -1,4 +1,4 @@
-"""The compiled loop is made once, whole, and by whatever compiler there is."""
+"""The compiled loop is compiled once, completely, and by any compiler."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ from orchestrator.machine.errors import InputError
 from support.machine import eventually, members
 from support.tiers import slow
 
-#: Warnings are errors, and C is that of the standard.
+#: Warnings are errors, and the language is standard C.
 STRICT = ["-Wall", "-Wextra", "-pedantic", "-Werror"]
 
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache folder in which nothing is kept."""
-    # What zig has made of its own takes seconds, and serves all tests.
+    """An empty cache folder."""
+    # zig compiles its own libraries for seconds; all tests share them.
     monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", str(Path(os.environ["XDG_CACHE_HOME"], "zig")))
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     return tmp_path / "auv-fmu" / "loop"
@@ -76,7 +76,7 @@ def test_a_cache_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     ("said", "heard"), [("no licence", "no licence"), (r"\377 licence", "\ufffd licence")]
 )
 def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, heard):
-    """Also where what it says is no text."""
+    """Even if its message is not text."""
     compiler = tmp_path / "cc"
     compiler.write_text(f"#!/bin/sh\necho first >&2\nprintf '{said}' >&2\nexit 1\n")
     compiler.chmod(0o755)
@@ -89,8 +89,8 @@ def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, hea
 
 @needs_compiler
 @pytest.mark.parametrize("length", [3000, *slow(0, 100, -1)])
-def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, monkeypatch):
-    # In another process: this one would hold on to the library.
+def test_a_truncated_library_is_not_loaded_but_compiled_again(cache, length, monkeypatch):
+    # In another process, since this one keeps the library loaded.
     code = "from orchestrator.cosim import loop; print(loop.compile_stepper()._name)"
     [place] = map(Path, subprocess.check_output([sys.executable, "-c", code]).decode().split())
     content = place.read_bytes()
@@ -100,12 +100,12 @@ def test_a_library_that_was_cut_is_never_loaded_but_made_anew(cache, length, mon
     assert loop.load_stepper() is None
     assert loop.compile_stepper().advance
     assert loaded and str(place) not in loaded
-    # Whatever that is, it is not ours to overwrite.
+    # A file that is not ours is not overwritten.
     assert place.read_bytes() == content[:length]
 
 
 @needs_compiler
-def test_a_library_without_the_function_is_no_library(cache, tmp_path):
+def test_a_library_without_the_function_is_not_loaded(cache, tmp_path):
     source = tmp_path / "other.c"
     source.write_text("int other(void) { return 0; }")
     other = tmp_path / "other.so"
@@ -126,7 +126,7 @@ def test_what_others_have_in_the_cache_stays(cache):
 
 
 @pytest.mark.parametrize("script", ["sleep 1000", *slow("exec sleep 1000", "sleep 1000 >&- 2>&-")])
-def test_a_compiler_that_hangs_is_ended_with_what_it_has_started(tmp_path, monkeypatch, script):
+def test_a_compiler_that_hangs_is_ended_with_its_children(tmp_path, monkeypatch, script):
     compiler = tmp_path / "cc"
     compiler.write_text(f"#!/bin/sh\necho $$ > {tmp_path}/session\n{script}\necho\n")
     compiler.chmod(0o755)

@@ -1,4 +1,4 @@
-"""A system finds its ports by their names; what waits for what, and the orders that follow."""
+"""Names of ports in a system; dependencies of components, and orders that follow from them."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def test_output_that_is_calculated_cannot_be_set(system):
 
 @given(st.lists(st.integers(-9, 9), min_size=1, max_size=6), st.booleans())
 def test_list_for_a_group_has_a_value_for_each_member(several, values, as_text):
-    """In the order in which they are declared; of any other length, it is refused."""
+    """In the order of declaration; a list of another length is refused."""
     given = ", ".join(map(str, values)) if as_text else values
     name = PortName.read("a.b.v")
     if len(values) == 3:
@@ -113,7 +113,7 @@ def test_list_for_a_group_has_a_value_for_each_member(several, values, as_text):
             PortName("a.b", "w"): 1.0
         }
     else:
-        # One number as text is no list.
+        # A text with one number is not a list.
         is_one = as_text and len(values) == 1
         what = r"a list of 3 values, for a\.b\.v\[3\]" if is_one else f"3 values, not {len(values)}"
         with pytest.raises(InputError, match=rf"a\.b\.v: takes {what}"):
@@ -148,7 +148,7 @@ def test_array_without_dimensions_is_one_value(several):
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> System:
-    """Three components of a name in systems of their own, and one that has it by itself."""
+    """Three components of one name in systems of their own, and one outside."""
     parameters = [variable(name, "parameter") for name in ("k", "v[1]", "v[2]")]
     path = fmu(tmp_path_factory.mktemp("fleet") / "a.fmu", *parameters)
     names = ("auv1.a", "auv2.a", "auv10.a", "a", "auv1.b.a")
@@ -182,13 +182,13 @@ def test_a_star_stands_for_a_part_of_a_component_s_name(fleet, values, k):
     st.text("ab?[.*", max_size=9),
 )
 def test_stars_stand_for_text_without_dots(name, pattern):
-    """As words of a regular expression say it."""
+    """Compared with regular expressions."""
     words = "".join("[^.]*" if letter == "*" else re.escape(letter) for letter in pattern)
     assert _is_like(name, pattern) == bool(re.fullmatch(words, name))
 
 
 def test_many_stars_are_matched_at_once():
-    """With time that doubles with each star, this would not end."""
+    """A search that doubles with each star would not end."""
     assert not _is_like(100 * "a", 60 * "a*" + "b")
 
 
@@ -231,7 +231,7 @@ def chain_of(folder: Path, *names: str) -> System:
     )
 
 
-def test_all_that_names_a_component_has_its_new_name(tmp_path: Path):
+def test_a_renamed_component_has_its_new_name_everywhere(tmp_path: Path):
     system = chain_of(tmp_path, "a", "b", "c").renamed({"a": "v.a", "c": "a"})
     assert [(name, part.name) for name, part in system.components.items()] == [
         ("v.a", "v.a"), ("b", "b"), ("a", "a"),
@@ -272,7 +272,7 @@ def system_of(names: Iterable[str], through: Iterable[Edge], states: Iterable[Ed
 
 @st.composite
 def graphs(draw: st.DrawFn) -> tuple[list[str], set[Edge], set[Edge]]:
-    """Components in any order, connections with feedthrough, and others."""
+    """Components in random order, connections with feedthrough, and others."""
     names = draw(st.permutations(NAMES[: draw(st.integers(1, 7))]))
     name = st.sampled_from(names)
     through, states = (draw(st.sets(st.tuples(name, name), max_size=14)) for _ in range(2))
@@ -280,7 +280,7 @@ def graphs(draw: st.DrawFn) -> tuple[list[str], set[Edge], set[Edge]]:
 
 
 def reached(names: Iterable[str], edges: set[Edge]) -> set[Edge]:
-    """Which component reaches which, by paths of one edge and more."""
+    """Compute which component reaches which, by paths of one edge or more."""
     found = set(edges)
     for middle in names:
         found |= {(a, d) for a, b in found for c, d in found if b == c == middle}
@@ -288,7 +288,7 @@ def reached(names: Iterable[str], edges: set[Edge]) -> set[Edge]:
 
 
 def strong_parts(names: Sequence[str], edges: set[Edge]) -> set[frozenset[str]]:
-    """Components that reach each other, or themselves."""
+    """Compute the components that reach each other, or themselves."""
     paths = reached(names, edges)
     return {
         frozenset({a} | {b for b in names if (a, b) in paths and (b, a) in paths})
@@ -298,7 +298,7 @@ def strong_parts(names: Sequence[str], edges: set[Edge]) -> set[frozenset[str]]:
 
 
 def opened(names: Sequence[str], edges: set[Edge]) -> set[Edge]:
-    """The edges that come late: of each ring what feeds its first component, until none is left."""
+    """Compute the late edges: those into the first component of each ring, until none is left."""
     late: set[Edge] = set()
     while parts := strong_parts(names, edges - late):
         for part in parts:
@@ -324,7 +324,7 @@ def test_rings_are_the_components_that_reach_each_other(graph, some):
 
 
 @given(graphs())
-def test_only_what_opens_a_ring_is_late_in_the_derived_order(graph):
+def test_only_connections_that_open_a_ring_are_late_in_the_derived_order(graph):
     names, through, states = graph
     system = system_of(names, through, states)
     order = system.derived_order()
@@ -368,7 +368,7 @@ def test_stages_keep_the_order_of_every_feedthrough(graph, random, are_solved):
     assert all(members.issuperset(stage) or members.isdisjoint(stage) for stage in stages)
     if not are_solved:
         assert [name for stage in stages for name in stage] == order
-        # A new stage is begun only where a component takes what the one before has computed.
+        # A new stage begins only where a component takes a value of the stage before.
         for before, stage in pairwise(stages):
             assert any((a, stage[0]) in through for a in before)
 

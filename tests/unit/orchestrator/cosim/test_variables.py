@@ -1,4 +1,4 @@
-"""Variables, elements of arrays among them, and values from text and back."""
+"""Variables, including elements of arrays, and their values from and to text."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_elements_count_from_one_the_last_index_first(component):
     ("name", "words"),
     [("b", "Binary"), ("c", "Clock"), ("of_c", "Clock"), ("z", "y"), ("u", "u[1]"), ("u[4]", "u")],
 )
-def test_what_is_no_port_is_refused_by_name(component, name, words):
+def test_names_that_are_not_ports_are_refused_by_name(component, name, words):
     with pytest.raises(InputError) as error:
         component.variable(name)
     assert mentions(str(error.value), f"a {name} {words}")

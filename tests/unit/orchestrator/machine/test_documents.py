@@ -56,6 +56,6 @@ def test_foreign_namespace_is_a_note_but_in_annotations():
         ("<!DOCTYPE a><a/>", "it has a DOCTYPE"),
     ],
 )
-def test_what_is_no_xml_or_could_unfold_is_refused(text: str, why: str):
+def test_malformed_or_expanding_xml_is_refused(text: str, why: str):
     with pytest.raises(ValueError, match=why):
         read(text)

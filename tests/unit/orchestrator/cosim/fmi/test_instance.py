@@ -1,4 +1,4 @@
-"""What a run asks of a component, of an FMU in this process and of one in its own."""
+"""The calls of a component in a run, in this process and in a separate one."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ PLACES = pytest.mark.parametrize("place", ["here", "isolated"])
 
 @contextmanager
 def ready(system: System, place: str) -> Iterator[tuple[Instance, Row]]:
-    """The instance of a system of one component, ready for its first step, and the row."""
+    """Return the instance of a system of one component, initialised, and the row."""
     with held_interrupts() as interrupts:
         isolation = Isolation() if place == "isolated" else None
         with place_instances(system.components, Log(), isolation, interrupts) as instances:
@@ -41,7 +41,7 @@ def ready(system: System, place: str) -> Iterator[tuple[Instance, Row]]:
 
 
 def stepped(instance: Instance, row: Row, first: int, n: int) -> np.ndarray:
-    """The rows after some steps, of which the first is given by its number."""
+    """Return the rows after some steps, beginning with step number `first`."""
     rows = np.empty((n, len(row.values)))
     for i in range(n):
         step_members([member(instance)], c_double((first + i) * STEP), c_double(STEP))
@@ -51,8 +51,8 @@ def stepped(instance: Instance, row: Row, first: int, n: int) -> np.ndarray:
 
 @PLACES
 @pytest.mark.parametrize("kind", ["dist", "native"])
-def test_a_state_goes_on_in_another_instance_bit_for_bit(request, kind: str, place: str):
-    """A plant with its noise: ten steps are three, and seven more from the state between."""
+def test_a_state_continues_in_another_instance_bit_for_bit(request, kind: str, place: str):
+    """A plant with noise: ten steps equal three and seven more from the state between."""
     plant = closed_loop(request.getfixturevalue(kind)).components["plant"]
     pushed = System("pushed", {"plant": plant}, ()).with_parameters(
         {PortName("plant", "tau.u"): 10.0, PortName("plant", "noise.std"): 0.01}
@@ -85,7 +85,7 @@ def test_an_fmu_that_gives_no_state_is_named(tmp_path: Path, place: str):
 
 @PLACES
 @pytest.mark.parametrize("kind", ["dist", "native"])
-def test_bytes_that_are_no_state_are_refused(request, kind: str, place: str):
+def test_bytes_that_are_not_a_state_are_refused(request, kind: str, place: str):
     plant = closed_loop(request.getfixturevalue(kind)).components["plant"]
     with (
         ready(System("one", {"plant": plant}, ()), place) as (instance, _),

@@ -1,4 +1,4 @@
-"""What the process of an isolated FMU may answer, whatever an FMU has made of it."""
+"""Any answer of the process of an isolated FMU, which the FMU may have changed."""
 
 from __future__ import annotations
 
@@ -35,7 +35,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.interrupts import Interrupts
 from support.others import build, system_of
 
-#: Answers of a run before its first step, of which the first says that it begins, and its steps.
+#: Number of answers before the first step, including the one for the start, and number of
+#: steps.
 BEFORE, STEPS = 8, 5
 
 
@@ -60,7 +61,7 @@ NOTES = (
 
 
 class Answering(Channel):
-    """An end of a connection that sends what it should, but for one message, its last."""
+    """An end of a connection that sends right answers, except one message, its last."""
 
     def __init__(self, connection: socket.socket, component: Component, n: int, other: bytes):
         super().__init__(connection, *sizes(component))
@@ -76,7 +77,7 @@ class Answering(Channel):
 
 @contextmanager
 def answering(component: Component, channel: Answering) -> Iterator[None]:
-    """A thread that serves an FMU."""
+    """Start a thread that serves an FMU."""
 
     def serve() -> None:
         Served(component, channel).answer_all(component.folder)
@@ -91,7 +92,7 @@ def answering(component: Component, channel: Answering) -> Iterator[None]:
 
 
 def run(system: System, n: int, length: float, outputs: list[float], note: bytes) -> Table:
-    """A run whose n-th answer is replaced by another."""
+    """Make a run whose n-th answer is replaced."""
     table = Table()
     [component] = system.components.values()
 
@@ -121,7 +122,7 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> System:
 
 
 def test_answers_are_counted_as_they_come(system: System):
-    """The first of a step is the first that leaves a row behind it."""
+    """The first answer of a step is the first one with a row before it."""
     lengths = [len(run(system, BEFORE + k, 1e99, [0.0] * 4, b"")) for k in range(STEPS)]
     assert lengths == [1 + k for k in range(STEPS)]
     table = run(system, BEFORE + STEPS + 1, 1e99, [0.0] * 4, b"")
@@ -147,7 +148,7 @@ def test_answers_are_counted_as_they_come(system: System):
 def test_whatever_is_answered_ends_in_a_line_with_the_rows_before_it(system, n, note, change):
     outputs = [1.0, 1.0, 0.0, 0.0]
     if n < BEFORE:
-        # Some of it is an answer, too.
+        # Some random bytes are valid answers.
         with suppress(InputError):
             run(system, n, len(note) + change, outputs, note)
         return

@@ -1,4 +1,4 @@
-"""SSP archives are read as their standard says, and what is not done is said by name."""
+"""SSP archives are read as the standard says; unsupported features are refused by name."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Read = Callable[..., System]
 
 @pytest.fixture(scope="module")
 def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """FMUs: one with ports of all kinds, one in each unit of length."""
+    """FMUs: one with ports of all kinds, and one for each unit of length."""
     folder = tmp_path_factory.mktemp("fmus")
     kinds = ("Real", "Integer", "Boolean", "String", "Enumeration")
     found = {
@@ -69,7 +69,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 @pytest.fixture
 def read(files: dict[str, Path], tmp_path: Path) -> Read:
-    """Reads a description with the FMUs and some more files beside it."""
+    """A function that reads a description, with the FMUs and other files next to it."""
 
     def reader(
         text: str, findings: Findings | None = None, /, version: str = "1.0", **more: str
@@ -142,7 +142,7 @@ BUS = (
     ("inside", "name", "around", "more"),
     [
         ((component("b"), connection("b.u", "u"), connector("u", "input")), "inner.u", "", ""),
-        # Some writers leave the name of an element empty where it is the system itself.
+        # Some tools leave the name of an element empty for the system itself.
         (
             (component("b"), connection("u", "b.u").replace(
                 "<ssd:Connection ", '<ssd:Connection startElement="" '), connector("u", "input")),
@@ -180,8 +180,8 @@ LENGTHS = {"m": 1.0, "mm": 1e-3, "km": 1e3}
     ),
     last=st.none() | st.tuples(st.integers(1, 3), st.integers(-2, 2)),
 )
-def test_units_and_transformations_along_a_way_are_those_of_each_hop(read: Read, ends, way, last):
-    """What arrives is what one gets who converts and transforms from connector to connector."""
+def test_units_and_transformations_of_a_long_way_follow_from_each_hop(read: Read, ends, way, last):
+    """Compared with a conversion and transformation from connector to connector."""
     source, target = ends
     hops = [*way, (target, last)]
     inside, unit, value = component("b", f"{target}.fmu"), source, 7.0
@@ -192,7 +192,7 @@ def test_units_and_transformations_along_a_way_are_those_of_each_hop(read: Read,
         if transformation is not None:
             value = transformation[0] * value + transformation[1]
             if not to:
-                # Nobody knows any more what it is in, and nobody may convert it.
+                # Its unit is unknown from there on, so that it cannot be converted.
                 return
     texts = [
         "" if hop is None else f'<ssc:LinearTransformation factor="{hop[0]}" offset="{hop[1]}"/>'
@@ -254,7 +254,7 @@ def test_tables_of_values_become_numbers(read: Read, kind: str, text: str, pairs
     [segment] = read(top).connections
     assert isinstance(segment.transformation, Mapped)
     assert set(segment.transformation.pairs) == pairs
-    # The standard leaves values alone that stand in no entry.
+    # Values without an entry stay as they are.
     assert segment.transformation(17.0) == 17.0
 
 
@@ -291,7 +291,7 @@ def test_outer_systems_and_later_sets_win(read: Read):
 
 
 def test_prefix_mapping_and_files_reach_what_they_name(read: Read):
-    """A set for one component is applied at the top, renamed and transformed."""
+    """A set for one component, applied at the top, is renamed and transformed."""
     entries = mapping(
         'source="s.gain" target="s.c.k"|<ssc:LinearTransformation factor="4" offset="5"/>',
         'source="s.gain" target="s.c.u"',
@@ -311,7 +311,7 @@ def test_prefix_mapping_and_files_reach_what_they_name(read: Read):
 
 
 def test_values_of_system_connectors_go_down_to_the_components(read: Read):
-    """The outermost that has a value counts; units and transformations of the way count, too."""
+    """The outermost value counts, with the units and transformations on the way."""
     inner = system(
         component("c", "m.fmu"),
         connection("u", "c.u", '<ssc:LinearTransformation offset="1"/>') + connection("p", "c.k"),
@@ -375,7 +375,7 @@ def test_source_is_an_address(read: Read, files, tmp_path: Path, source: str):
 
 
 def test_parameter_set_inside_an_fmu(files, tmp_path: Path):
-    """Its address is relative to the component, where it says so."""
+    """Its address is relative to the component, if stated."""
     holder = fmu(tmp_path / "holder.fmu", variable("k", "parameter"))
     with ZipFile(holder, "a") as content:
         content.writestr("resources/set.ssv", parameter_set({"k": 'Real value="4"'}))
@@ -470,7 +470,7 @@ def test_what_cannot_be_run_is_said_by_name(read: Read, text: str, why: str):
     assert mentions(problem(read, text), why)
 
 
-def test_a_parameter_set_that_is_no_xml_is_named_once(read: Read):
+def test_a_parameter_set_without_xml_is_named_once(read: Read):
     text = problem(read, system(component("a", bindings=binding(source="s.ssv"))), s__ssv="k = 1")
     assert text.count("test.ssp") == 1 and mentions(text, "s.ssv XML")
 
@@ -515,7 +515,7 @@ def test_what_is_harmless_is_a_note_and_a_problem_for_the_strict(read: Read, tex
     assert note in str(error.value)
 
 
-def test_nothing_is_said_of_what_is_right(read: Read):
+def test_valid_files_have_no_findings(read: Read):
     top = system(component("a", bindings=binding({"k": 'Real value="1"'})) + component("b"),
                  connection("a.y", "b.u"))  # fmt: skip
     assert notes(read, top) == []
@@ -628,7 +628,7 @@ units = st.sampled_from(["", "m", "mm", "km", "K", "furlong"])
 
 
 class OneByOne(reader._Ports):
-    """Each port followed upstream by itself, and its way transformed from its beginning."""
+    """Follows each port by itself, and transforms its value from the beginning."""
 
     def __init__(self, archive, leaves, segments, given) -> None:
         self.connections, self.parameters = [], {}
@@ -689,7 +689,7 @@ class OneByOne(reader._Ports):
 
 
 def read_with(path: Path, ports: type[reader._Ports]):
-    """What is read of an archive, right or wrong."""
+    """Read an archive and return the result, right or wrong."""
     findings = Findings()
     with patch.object(reader, "_Ports", ports), findings.collecting():
         found = reader.read_ssp(path, findings=findings)
@@ -739,7 +739,7 @@ def test_ports_get_what_each_gets_that_is_followed_by_itself(description: str, u
 
 
 def test_long_way_to_many_ports_is_gone_once(tmp_path: Path):
-    """Followed port by port, this would take hours."""
+    """Followed port by port, it would take hours."""
     n = 3000
     chain = [f"c{i}" for i in range(n)]
     ports = [f"a.u{i}" for i in range(n)]

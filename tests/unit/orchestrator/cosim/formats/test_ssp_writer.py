@@ -1,4 +1,4 @@
-"""What is written is what was read, and valid."""
+"""Systems are read as they were written, and files are valid."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from support.texts import mentions
 
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> System:
-    """A system with all that a system may have, two of whose FMUs have one name."""
+    """A system with every feature, two of whose FMUs have the same name."""
     folder = tmp_path_factory.mktemp("fmus")
     (folder / "other").mkdir()
     ports = (
@@ -97,7 +97,7 @@ def test_system_that_is_written_and_read_is_the_same(found: System, tmp_path: Pa
 
 @pytest.mark.parametrize("step", [None, 0.02])
 def test_what_is_written_is_valid(found: System, tmp_path: Path, step: float | None):
-    """fmpy holds it against the schemas of SSP 1.0."""
+    """fmpy checks it with the schemas of SSP 1.0."""
     [path] = write_ssp(replace(found, step=step), tmp_path)
     read_ssd(str(path))
     with ZipFile(path) as content:
@@ -108,7 +108,7 @@ def test_what_is_written_is_valid(found: System, tmp_path: Path, step: float | N
 
 
 def test_choices_are_numbers_without_connectors(found: System, tmp_path: Path):
-    """Other tools end at an Enumeration there, or do not set it."""
+    """Other tools fail at an Enumeration, or do not set it."""
     [path] = write_ssp(found, tmp_path)
     with ZipFile(path) as content:
         [of_k] = [name for name in content.namelist() if name.startswith("parameters/inner")]
@@ -134,7 +134,7 @@ def test_choices_that_libcosim_does_not_set_are_not_written_for_it(tmp_path: Pat
 def test_inputs_that_are_open_on_purpose_have_no_connector_and_stay_so(
     found: System, tmp_path: Path
 ):
-    """fmpy takes for a connector without a connection the source of the one before."""
+    """fmpy feeds a connector without a connection from the source of the previous one."""
     left_open = {PortName("inner.a b", "c")}
     system = replace(found, left_open=left_open)
     [path] = write_ssp(system, tmp_path)
@@ -152,7 +152,7 @@ def test_inputs_that_are_open_on_purpose_have_no_connector_and_stay_so(
 def test_omsimulator_is_told_the_step_where_it_looks_for_it(
     found: System, tmp_path: Path, step: float
 ):
-    """Its Python side takes the attributes, its C++ side the child, by literal prefixes."""
+    """Its Python version reads the attributes, its C++ version the child, by literal prefixes."""
     [path] = write_ssp(replace(found, step=step), tmp_path)
     with ZipFile(path) as content:
         text = content.read("SystemStructure.ssd").decode()
@@ -170,7 +170,7 @@ def test_omsimulator_is_told_the_step_where_it_looks_for_it(
     assert f'<osp:FixedStepAlgorithm baseStepSize="{step}" />' in text
     root_element = text[text.index("<ssd:SystemStructureDescription") :].partition(">")[0]
     assert "xmlns:osp=" in root_element and "xmlns:oms=" in root_element
-    # Without libcosim's annotation it is what is left to be read.
+    # Without libcosim's annotation, the one of OMSimulator is read.
     other = text.replace("FixedStepAlgorithm", "Another")
     with ZipFile(path) as content:
         files = {name: content.read(name) for name in content.namelist() if name.count("/")}
@@ -183,7 +183,7 @@ def test_a_format_without_words_for_a_transformation_refuses_it(found: System, t
 
 
 def test_fmus_of_one_name_stay_apart(tmp_path: Path):
-    """Also where names differ in case only, or one is that of the format's own file."""
+    """Even if names differ only in case, or equal the name of the format's own file."""
     names = ("a/M.fmu", "b/M.fmu", "b/m.fmu", "c/2_M.fmu", "c/OspSystemStructure.xml")
     components = {}
     for i, name in enumerate(names):
@@ -214,7 +214,7 @@ def test_plain_names_are_distinct_and_kept_where_they_can_be():
 
 @pytest.fixture
 def mixed(tmp_path: Path) -> System:
-    """A system of FMI 2.0 and 3.0, with arrays connected as wholes and in parts."""
+    """A system of FMI 2.0 and 3.0, with arrays connected as a whole and in parts."""
     files = {
         "3.fmu": fmu3(tmp_path / "3.fmu"),
         "2.fmu": fmu(tmp_path / "2.fmu", variable("u", "input"), variable("y", "output")),
@@ -250,7 +250,7 @@ def test_ssp_2_that_is_written_and_read_is_the_same(mixed: System, tmp_path: Pat
 
 @pytest.mark.skipif(find_spec("pyssp_standard") is None, reason="pyssp_standard is not installed")
 def test_ssp_2_that_is_written_is_valid(mixed: System, tmp_path: Path):
-    """Held against the schemas of SSP 2.0, which that package has."""
+    """Checked with the schemas of SSP 2.0 in pyssp_standard."""
     found = find_spec("pyssp_standard")
     assert found is not None and found.origin is not None
     schemas = Path(found.origin).with_name("resources") / "ssp2"
@@ -264,12 +264,12 @@ def test_ssp_2_that_is_written_is_valid(mixed: System, tmp_path: Path):
                 etree.XMLSchema(schema).assertValid(etree.fromstring(content.read(name)))
 
 
-#: What XML 1.0 can hold, and what it cannot.
+#: Characters that XML 1.0 can hold, and others.
 _PLAIN = st.characters(codec="utf-8", exclude_categories=["Cc"], exclude_characters="\ufffe\uffff")
 LEGAL = st.text(_PLAIN | st.sampled_from("\t\n\r<>&\"' \x85\u2028"), max_size=8)
 ILLEGAL = st.sampled_from("\x01\x08\x0b\x0c\x0e\x1f\ufffe\uffff")
 
-#: Names of components; a dot would put one into another system.
+#: Names of components; a dot would nest them.
 LEGAL_NAMES = LEGAL.filter(lambda text: text.strip() and "." not in text)
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False) | st.sampled_from([-0.0, 2.0**63])
@@ -324,10 +324,10 @@ def test_numbers_texts_and_names_are_read_as_they_were(
     assert list(again.components) == names
     for one, other in zip(again.connections, system.connections, strict=True):
         assert (one.source, one.target) == (other.source, other.target)
-        # No file has an empty table, which changes nothing.
+        # Files have no empty mappings, which change nothing.
         how = Linear() if other.transformation == Mapped(()) else other.transformation
         assert repr(one.transformation) == repr(how)
-    # Of an array, all elements are written.
+    # All elements of an array are written.
     elements = {"names[2]": ["a", "b"], "M[1,2]": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}
     expected = dict(values)
     for element, starts in elements.items():
@@ -339,7 +339,7 @@ def test_numbers_texts_and_names_are_read_as_they_were(
     assert {port: repr(value) for port, value in found.items()} == {
         port: repr(value) for port, value in expected.items()
     }
-    # The start time may be minus zero, which is zero.
+    # The start time may be minus zero, which equals zero.
     assert (again.start_time, again.stop_time, again.step) == (start, stop, step)
     assert again.steps == system.steps
 
@@ -367,7 +367,7 @@ def test_an_array_with_a_start_that_is_not_finite_is_refused_by_name(tmp_path: P
 
 @pytest.mark.parametrize("write", [write_ssp, write_osp])
 def test_an_fmu_that_has_changed_since_it_was_read_is_refused(tmp_path: Path, write):
-    """As by every other command that takes it along."""
+    """Like every other command that copies it."""
     path = fmu(tmp_path / "a.fmu", variable("u", "input"), variable("y", "output"))
     system = replace(small_fmus.connected("a", {"a": path, "b": path}), step=0.1)
     (tmp_path / "out").mkdir()
@@ -377,7 +377,7 @@ def test_an_fmu_that_has_changed_since_it_was_read_is_refused(tmp_path: Path, wr
     assert mentions(str(error.value), "a.fmu changed")
 
 
-#: What an FMU of FMI 2.0 has: two Reals in one unit, one in another, a number, and a parameter.
+#: Ports of an FMU of FMI 2.0: two Reals in one unit, one in another, a number, and a parameter.
 PORTS = (
     variable("u.x", "input", unit="m"), variable("v", "input", unit="km"),
     variable("n", "input", "Integer"), variable("y.x", "output", unit="m"),
@@ -408,11 +408,11 @@ def system_of(
     made: dict[str, (Linear | Mapped)] | None = None,
     **others: object,
 ) -> System:
-    """A system of components by the kinds of their FMUs, and targets by their sources.
+    """Make a system of components by the kinds of their FMUs, and targets by their sources.
 
     Args:
-        parts: components by their kinds.
-        kinds: by names.
+        parts: components by kind.
+        kinds: by name.
         wires: sources by targets, each a component and a port with a colon between them.
         made: transformations by targets.
         others: further attributes of the system.
@@ -444,7 +444,7 @@ def check_same(again: System, system: System) -> None:
     assert list(again.components) == list(system.components)
     digests = [{n: c.digest for n, c in one.components.items()} for one in (again, system)]
     assert digests[0] == digests[1]
-    # Each input has one connection, so their order says nothing.
+    # Each input has one connection, so that their order does not matter.
     assert len(again.connections) == len(system.connections)
     assert set(again.connections) == set(system.connections)
     assert again.parameters == system.parameters
@@ -466,13 +466,13 @@ def structure(system: System, offered: bool = False) -> ElementTree.Element:
 
 
 def connectors(element: ElementTree.Element) -> list[tuple[str, str]]:
-    """Names and kinds of the connectors of a system."""
+    """Return names and kinds of the connectors of a system."""
     found = element.findall("Connectors/Connector")
     return [(one.get("name", ""), one.get("kind", "")) for one in found]
 
 
 def lines(element: ElementTree.Element) -> set[tuple[str, str]]:
-    """The connections in a system, ends with a colon between element and connector."""
+    """Return the connections in a system, ends with a colon between element and connector."""
     return {
         (
             f"{one.get('startElement', '')}:{one.get('startConnector')}",
@@ -525,7 +525,7 @@ def test_flat_system_has_no_system_in_it(parts: dict[str, Component]):
 
 
 def test_no_two_connectors_of_a_system_are_one_nor_one_an_element(parts: dict[str, Component]):
-    """The names of elements here are those that connectors would have."""
+    """The elements here have the names that connectors would get."""
     system = system_of(
         parts,
         {"a.p": "2", "a.a_p_m": "2", "a.q.p": "2", "a.q_p": "2", "b": "2", "c": "2"},
@@ -541,8 +541,8 @@ def test_no_two_connectors_of_a_system_are_one_nor_one_an_element(parts: dict[st
     check_same(round_trip(system), system)
 
 
-def test_connectors_with_dots_are_read_as_well(parts: dict[str, Component], tmp_path: Path):
-    """As archives had them before."""
+def test_connectors_with_dots_can_be_read(parts: dict[str, Component], tmp_path: Path):
+    """As in archives of earlier versions."""
     system = system_of(parts, {"a.p": "2", "b.c.p": "2"}, {"b.c.p:u.x": "a.p:y.x"})
     text = structure_xml(system).decode()
     assert 'name="a_p_y_x"' in text
@@ -552,7 +552,7 @@ def test_connectors_with_dots_are_read_as_well(parts: dict[str, Component], tmp_
 
 
 def test_a_name_that_begins_another_component_stays_one(parts: dict[str, Component]):
-    """As do parts of names without letters."""
+    """Parts of names without letters, too."""
     kinds = dict.fromkeys(("a", "a.b", "a.b.c.d", "x..y", "x.y", ".z", "w.", "v.1"), "2")
     targets = list(kinds)
     wires = {
@@ -579,7 +579,7 @@ def test_arrays_cross_borders_as_a_whole(parts: dict[str, Component]):
 
 
 def test_what_happens_to_a_value_on_its_way_is_read_as_it_was(parts: dict[str, Component]):
-    """In the unit of the output, also where two FMUs call different lengths a metre."""
+    """In the unit of the output, even if two FMUs define a metre differently."""
     made: dict[str, (Linear | Mapped)] = {
         "b.c.p:v": Linear(0.001, 2.0), "b.c.p:n": Mapped(((1.0, 2.0),)), "a.q:u.x": Linear(),
         "b.p:u.x": Linear(0.3048),
@@ -599,7 +599,7 @@ def test_what_happens_to_a_value_on_its_way_is_read_as_it_was(parts: dict[str, C
 def test_parameters_steps_open_inputs_and_order_are_read_as_they_were(
     parts: dict[str, Component],
 ):
-    """The components of two systems are stated in turn."""
+    """The components of two systems alternate."""
     system = system_of(
         parts,
         {"a.p": "2", "b.p": "3", "a.q": "2", "b.in.q": "2", "a.in.q": "3"},
@@ -613,7 +613,7 @@ def test_parameters_steps_open_inputs_and_order_are_read_as_they_were(
         start_time=1.0, stop_time=3.0, step=0.25,
     )  # fmt: skip
     check_same(round_trip(system), system)
-    # Where nesting keeps the order there is nothing to be said of it.
+    # No annotation is needed if nesting keeps the order.
     assert b"<Order" not in ssp_bytes(system_of(parts, {"a.p": "2", "a.q": "2", "b": "2"}, {}))
 
 
@@ -630,7 +630,7 @@ def test_fmpy_finds_the_schema_kept(parts: dict[str, Component], tmp_path: Path,
 @pytest.mark.skipif(find_spec("pyssp_standard") is None, reason="pyssp_standard is not installed")
 @pytest.mark.parametrize("offered", [False, True])
 def test_nested_ssp_2_is_valid(parts: dict[str, Component], offered: bool):
-    """Held against the schema of SSP 2.0, which that package has."""
+    """Checked with the schema of SSP 2.0 in pyssp_standard."""
     found = find_spec("pyssp_standard")
     assert found is not None and found.origin is not None
     schema = Path(found.origin).with_name("resources") / "ssp2" / "SystemStructureDescription.xsd"
@@ -644,7 +644,7 @@ def test_nested_ssp_2_is_valid(parts: dict[str, Component], offered: bool):
 
 
 def test_a_system_offers_its_outputs_and_open_inputs(parts: dict[str, Component]):
-    """An array as a whole, where it is open as a whole."""
+    """An array as a whole, if it is open as a whole."""
     system = system_of(
         parts,
         {"a.p": "2", "b": "3", "c": "3"},
@@ -666,14 +666,14 @@ def test_a_system_offers_its_outputs_and_open_inputs(parts: dict[str, Component]
         (":c_u", "c:u"),
         ("c:z", ":c_z"),
     } < ends
-    # What neither another port nor the border feeds has no connector.
+    # Ports without a connection have no connector.
     [inner] = outer.findall(".//System/Elements/Component")
     assert dict(connectors(inner)) == {
         "u.x": "input", "v": "input", "y.x": "output", "m": "output", "k": "parameter",
     }  # fmt: skip
 
 
-#: The rule of OMSimulator's `ComRef.cpp` for names of systems' connectors.
+#: OMSimulator's rule in `ComRef.cpp` for names of systems' connectors.
 IDENT = re.compile("[a-zA-Z][a-zA-Z0-9_-]*")
 
 NAMES = st.lists(
@@ -719,9 +719,9 @@ def nested_systems(draw: st.DrawFn, parts: dict[str, Component]) -> System:
 def test_random_systems_are_read_as_they_were(
     parts: dict[str, Component], data: st.DataObject, offered: bool
 ):
-    """Connectors of systems in them have names that OMSimulator takes."""
+    """Connectors of nested systems have names that OMSimulator accepts."""
     system = data.draw(nested_systems(parts))
-    # Ports of two components may have one name, which is refused.
+    # Ports of two components may have the same name, which is refused.
     assume(not list(system.problems()))
     check_same(round_trip(system, offered), system)
     outer = structure(system, offered)
