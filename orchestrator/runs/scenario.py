@@ -145,8 +145,9 @@ class Inputs:
         named = dict(zip(self.names, variables, strict=True))
         types = {name: one.type for name, one in named.items() if one.type in Header.TYPES}
         header = Header(self.names, Experiment(1.0, 1.0), types=types)
+        encoders = header.encoders
         numbers = {
-            name: partial(_number, name, variable, header.encoders.get(name, float))
+            name: partial(_number, name, variable, encoders.get(name, float))
             for name, variable in named.items()
             if name in types or variable.family in ("Boolean", "Enumeration")
         }
