@@ -35,8 +35,7 @@ from fmus.script import (
     source_of_script,
     told,
 )
-from orchestrator.machine.compilers import compiler_for
-from orchestrator.machine.platforms import platforms
+from orchestrator.machine.compilers import compiler_for, platforms
 
 #: Exit status if the user's script cannot be built; 2 is for what else is wrong.
 FAILED = 1

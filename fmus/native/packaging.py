@@ -18,8 +18,7 @@ from fmus.native.tables import tables
 from fmus.native.translator import translated
 from fmus.ports import description, description_fmi3
 from fmus.ports.definition import Definition, Model
-from orchestrator.machine.compilers import Compiler, library
-from orchestrator.machine.platforms import Platform
+from orchestrator.machine.compilers import Compiler, Platform, library
 
 _FOLDER = Path(__file__).parent
 

@@ -38,9 +38,9 @@ from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
 from orchestrator.cosim import Plan, PortName, Visit
 from orchestrator.machine.compilers import compiler_for
+from orchestrator.machine.compilers import platforms as platforms_of
+from orchestrator.machine.disk import file_name
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.file_names import file_name
-from orchestrator.machine.platforms import platforms as platforms_of
 from orchestrator.program.writer import Text, Unsupported
 
 _NOISE = """\

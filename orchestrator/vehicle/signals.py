@@ -18,8 +18,8 @@ from auv_fmu.paper.attitude import rotation_from_euler
 from auv_fmu.paper.control_point import control_point
 from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.cosim import PortName, System, Table, Value
+from orchestrator.machine.disk import file_name
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.file_names import file_name
 
 #: Members of groups of ports, in the paper's order.
 ACTUATORS, AXES = tuple(map(str, quantities.TAU)), tuple(map(str, quantities.POSITION))

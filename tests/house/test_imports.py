@@ -241,7 +241,7 @@ def test_no_modules_import_each_other():
 
 #: What tells one operating system from another, and the modules of the orchestrator that may ask.
 ASKS = {("os", "name"), ("sys", "platform"), ("platform", "system"), ("sys", "getwindowsversion")}
-ASKING = {("machine", name) for name in ("compilers", "operating_system", "platforms")}
+ASKING = {("machine", name) for name in ("compilers", "operating_system")}
 
 
 def test_the_lowest_room_asks_which_operating_system_there_is():

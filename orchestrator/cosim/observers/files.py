@@ -13,8 +13,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 
 from orchestrator.cosim.observers.observer import Ending, Header
+from orchestrator.machine.lazy import ROWS_AT_ONCE, parquet
 from orchestrator.machine.operating_system import is_still
-from orchestrator.machine.parquet import ROWS_AT_ONCE, parquet
 
 #: What Parquet needs at most: bytes of a value, and bytes that describe a column of the rows that
 #: are written at once.

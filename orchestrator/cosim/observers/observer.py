@@ -20,7 +20,7 @@ from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.values import Standing, as_float32
 from orchestrator.machine.errors import InputError, unforeseen
-from orchestrator.machine.progress import progress_bar
+from orchestrator.machine.lazy import progress_bar
 
 #: Rows in a block, and the longest time until observers are told of them [s].
 _ROWS, _PATIENCE = 512, 0.2

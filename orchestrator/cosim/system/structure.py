@@ -23,8 +23,8 @@ from orchestrator.cosim.system.graph import in_levels, opened, strongly_connecte
 from orchestrator.cosim.system.names import PortName, likely_port
 from orchestrator.cosim.system.values import Value
 from orchestrator.cosim.system.variables import Variable
+from orchestrator.machine.disk import plain_file_names
 from orchestrator.machine.errors import InputError, did_you_mean, listed
-from orchestrator.machine.file_names import plain_file_names
 from orchestrator.machine.texts import is_finite
 
 #: Values by the names of ports or of groups, taken apart or as text.

@@ -20,8 +20,8 @@ from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import BASE_UNITS, Linear, Mapped, Unit, defined, unit_of_port
 from orchestrator.cosim.system.values import Value
 from orchestrator.cosim.system.variables import Variable
+from orchestrator.machine.disk import file_name, plain_file_names
 from orchestrator.machine.errors import InputError, shortened
-from orchestrator.machine.file_names import file_name, plain_file_names
 from orchestrator.machine.texts import literal
 from orchestrator.machine.user_files import read_archive
 

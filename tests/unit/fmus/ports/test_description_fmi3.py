@@ -15,7 +15,7 @@ from fmus.ports.description_fmi3 import (
     variables_of,
 )
 from fmus.ports.port import FAULT, TIME, Array, Port
-from orchestrator.machine.platforms import TARGETS
+from orchestrator.machine.compilers import TARGETS
 
 REAL = ("continuous", "Real")
 PORTS = (

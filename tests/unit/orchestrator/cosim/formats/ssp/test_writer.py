@@ -24,8 +24,8 @@ from orchestrator.cosim.system.connection import Connection
 from orchestrator.cosim.system.names import PortName
 from orchestrator.cosim.system.structure import System
 from orchestrator.cosim.system.units import Linear, Mapped
+from orchestrator.machine.disk import plain_file_names
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.machine.file_names import plain_file_names
 from support import small_fmus, typed
 from support.archives import (
     archive,
