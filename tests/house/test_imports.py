@@ -51,7 +51,7 @@ DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|language\.build\.Untranslat
 
 #: What those import besides that translate components or indices.
 TRANSLATED = re.compile(r"fmus\.(documentation|language|native|script)(\.|$)")
-TRANSLATING = (("program",), ("vehicle", "compiled_reducers"))
+TRANSLATING = (("program",), ("vehicle", "reduction"))
 
 #: Rooms that run any system. Components are built with the lower one.
 GENERAL = ("machine", "cosim")
