@@ -1,7 +1,7 @@
 """Build the FMUs of all components, or of a user's one: `python -m fmus.build [SCRIPT] --out DIR`.
 
-It runs in a separate process, because PythonFMU imports the components that it builds. An FMU of the
-bundle is written only if its sources have changed; a user's FMU is always written.
+It runs in a separate process, because PythonFMU imports the components that it builds. An FMU of
+the bundle is written only if its sources have changed; a user's FMU is always written.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from fmus.script import (
     no_component,
     script_in,
     source_of_script,
-    told,
+    message_of,
 )
 from orchestrator.machine.compilers import compiler_for, platforms
 
@@ -146,7 +146,7 @@ def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind, home: st
         origin = Origin(fmu.name, kind.name, home, path.name, _digests(path))
         add_to_archive(fmu, ORIGIN, json.dumps(origin._asdict()).encode())
     except Exception as error:
-        print(told(error, path), file=sys.stderr)
+        print(message_of(error, path), file=sys.stderr)
         return FAILED
     return 0
 

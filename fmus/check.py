@@ -1,8 +1,8 @@
 """List all mistakes in a user's component or index: `python -m fmus.check SCRIPT`.
 
 Each mistake is printed on a line, with its file and line: errors in declarations, and code outside
-the language of equations. For a component without mistakes the FMUs of both kinds are written, the native
-one without libraries, and the compiler checks its C. The command runs in a separate process,
+the language of equations. For a component without mistakes the FMUs of both kinds are written, the
+native one without libraries, and the compiler checks its C. The command runs in a separate process,
 because it imports the script.
 """
 
@@ -25,7 +25,7 @@ from fmus.native.packaging import MAIN, fmu_entries
 from fmus.ports import reducer
 from fmus.ports.behaviour import HOOKS
 from fmus.python.packaging import PythonKind
-from fmus.script import is_component, no_component, script_in, source_of_script, told
+from fmus.script import is_component, no_component, script_in, source_of_script, message_of
 from orchestrator.machine.compilers import Compiler, check_sources
 
 
@@ -54,7 +54,7 @@ def mistakes(path: Path, folder: Path, is_index: bool = False) -> list[str]:
             place = PLACED.match(text)
             found.setdefault(place[0] if place else text, text)
     except RecursionError as error:
-        found[""] = told(error, script)
+        found[""] = message_of(error, script)
     return sorted(found.values(), key=position)
 
 
@@ -63,13 +63,13 @@ def _mistakes(script: Path, folder: Path, is_index: bool) -> Iterator[str]:
     try:
         module = import_module(source.module)
     except Exception as error:
-        yield told(error, script)
+        yield message_of(error, script)
         return
     is_index = is_index or reducer.is_reducer(module)
     hooks = (getattr(module, name, None) for name in (reducer.HOOKS if is_index else HOOKS))
     program = Program(*(hook for hook in hooks if isinstance(hook, FunctionType)))
     for mistake in program.mistakes:
-        yield told(Untranslatable(mistake), script)
+        yield message_of(Untranslatable(mistake), script)
     try:
         if is_index:
             reducer.read_reducer(module)
@@ -78,7 +78,7 @@ def _mistakes(script: Path, folder: Path, is_index: bool) -> Iterator[str]:
         if not program.mistakes:
             write(source, folder)
     except Exception as error:
-        yield told(error, script)
+        yield message_of(error, script)
 
 
 def write(source: Source, folder: Path) -> None:

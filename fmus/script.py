@@ -202,7 +202,7 @@ def _is_data(path: Path, root: Path) -> bool:
 # Mistakes
 
 
-def told(error: BaseException, path: Path) -> str:
+def message_of(error: BaseException, path: Path) -> str:
     """Return the message of an error in a component, on one line with its file and line.
 
     Args:

@@ -1,7 +1,6 @@
-"""modelDescription.xml of FMI 2.0 for both kinds of component, and what all versions say alike.
+"""modelDescription.xml of FMI 2.0 for both kinds of FMU, and the parts common to all versions.
 
-PythonFMU and we ourselves write a description's frame each in their own way; what is in it follows
-from the ports.
+The root element is written by PythonFMU or here; its content follows from the ports.
 """
 
 from __future__ import annotations
@@ -16,47 +15,47 @@ from fmus.ports.definition import DefaultExperiment, Model
 from fmus.ports.port import FAULT, Port, Value
 from fmus.ports.units import unit_of
 
-#: Whether steps may differ in size.
+#: Attribute that is true if steps may differ in size.
 _ANY_STEP = "canHandleVariableCommunicationStepSize"
 
-#: What an FMU can do, where all versions of FMI have the same word for it.
+#: Capabilities with the same name in all versions of FMI.
 CAPABILITIES = {
     "needsExecutionTool": "false",
     "canBeInstantiatedOnlyOncePerProcess": "false",
     _ANY_STEP: "true",
 }
 
-#: Statuses that messages are logged with and that have a category.
+#: Statuses of messages that have a category.
 _LOGGED = ("Warning", "Discard", "Error", "Fatal")
 
-#: How a variable gets its value at the start time; the standard forbids to say so of others.
+#: Attribute `initial` by causality; the standard forbids it for other causalities.
 _INITIAL = {"output": "calculated", "parameter": "exact"}
 
 
 class Dependency(NamedTuple):
-    """What an output depends on: all by numbers, in FMI 2.0 an index, in FMI 3.0 a reference."""
+    """Dependencies of an output, by indices in FMI 2.0 and by value references in FMI 3.0."""
 
-    number: int  #: of the output
-    direct: list[int]  #: what its value depends on without a state between
-    initial: list[int] | None  #: what its value at the start time depends on; None: all there is
+    number: int  #: number of the output
+    direct: list[int]  #: variables that it depends on without a state in between
+    initial: list[int] | None  #: variables that its initial value depends on; None: on all
 
 
 def _literal(value: Value) -> str:
-    """A value as XML writes it."""
+    """Write a value as in XML."""
     if isinstance(value, bool):
         return str(value).lower()
-    # What is read back has the same bits. numpy's numbers have a repr of their own.
+    # repr keeps all bits; float() because numpy's numbers have another repr.
     return repr(float(value)).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
-def capabilities_of(model: Model, said: Mapping[str, str]) -> dict[str, str]:
-    """What an FMU can do of what others can."""
-    return {**said, _ANY_STEP: str(model.experiment.takes_any_step).lower()}
+def capabilities_of(model: Model, known: Mapping[str, str]) -> dict[str, str]:
+    """Return capabilities, with the one that depends on the model."""
+    return {**known, _ANY_STEP: str(model.experiment.takes_any_step).lower()}
 
 
 def root_of(version: str, model: Model, **identity: str) -> Element:
-    """The root of a description that no other tool has written, with guid or token."""
-    said = {
+    """Make the root of a description; `identity` is the guid or token."""
+    attributes = {
         "fmiVersion": version,
         "modelName": model.name,
         **identity,
@@ -65,18 +64,18 @@ def root_of(version: str, model: Model, **identity: str) -> Element:
         "generationTool": f"auv-fmu {__version__}",
         "variableNamingConvention": "structured",
     }
-    return Element("fmiModelDescription", said)
+    return Element("fmiModelDescription", attributes)
 
 
 def text(root: Element) -> bytes:
-    """A document, whose bytes depend only on its elements."""
+    """Write a document, whose bytes depend only on its elements."""
     indent(root)
     content: bytes = tostring(root, encoding="utf-8")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + content + b"\n"
 
 
 def variable_attributes(reference: int, port: Port) -> dict[str, str]:
-    """What is said of a variable apart from its values."""
+    """Return the attributes of a variable that do not describe its values."""
     attributes = {
         "name": port.name,
         "valueReference": str(reference),
@@ -90,27 +89,27 @@ def variable_attributes(reference: int, port: Port) -> dict[str, str]:
 
 
 def value_attributes(port: Port) -> dict[str, str]:
-    """What is said of a variable's values."""
+    """Return the attributes of a variable's values."""
     declared = unit_of(port.unit).type_name if port.unit else port.enumeration
-    said = {"declaredType": declared, "unit": port.unit}
+    texts = {"declaredType": declared, "unit": port.unit}
     values = {
         "start": port.start,
         "min": port.minimum,
         "max": port.maximum,
     }
     return {
-        **{name: text for name, text in said.items() if text},
+        **{name: text for name, text in texts.items() if text},
         **{name: _literal(value) for name, value in values.items() if value is not None},
     }
 
 
 def units_of(ports: Sequence[Port]) -> list[str]:
-    """The units that ports have, each once."""
+    """Return the units of ports, each once."""
     return sorted({port.unit for port in ports if port.unit})
 
 
 def unit_definitions(units: Sequence[str]) -> Element:
-    """Units by the base units that they are made of."""
+    """Write units in terms of base units."""
     definitions = Element("UnitDefinitions")
     for unit in units:
         defined, said = SubElement(definitions, "Unit", name=unit), unit_of(unit)
@@ -121,13 +120,13 @@ def unit_definitions(units: Sequence[str]) -> Element:
             base["factor"] = _literal(said.factor)
         if said.offset:
             base["offset"] = _literal(said.offset)
-        # Some readers cannot do with an element without attributes; one is the default.
+        # Some tools cannot read an element without attributes; a factor of 1 is the default.
         SubElement(defined, "BaseUnit", base or {"factor": "1"})
     return definitions
 
 
 def type_definitions(ports: Sequence[Port], add: Callable[..., Element]) -> Element:
-    """The types of units and of enumerations; `add` makes the element of one."""
+    """Write the types of units and enumerations; `add` adds the element of a type."""
     definitions = Element("TypeDefinitions")
     for unit in units_of(ports):
         name = unit_of(unit).type_name
@@ -142,9 +141,9 @@ def type_definitions(ports: Sequence[Port], add: Callable[..., Element]) -> Elem
 def dependencies(
     ports: Sequence[Port], numbers: Iterable[int] | None = None
 ) -> Iterator[Dependency]:
-    """What each output depends on: its direct feedthrough, and at the start the parameters too.
+    """Yield the dependencies of outputs: direct feedthrough, and at the start also parameters.
 
-    Without other numbers for all ports, they are counted from one, as FMI 2.0 does.
+    By default ports are numbered from one, as in FMI 2.0.
     """
     places = {port.name: place for port, place in zip(ports, numbers or count(1))}
     parameters = [places[port.name] for port in ports if port.causality == "parameter"]
@@ -152,7 +151,7 @@ def dependencies(
         if port.causality == "output":
             # FMI 2.0 has no variable for the time.
             direct = [places[name] for name in port.feedthrough if name in places]
-            # fault is false at the start, unless what is set is refused.
+            # fault is false at the start, unless a value is refused.
             initial: list[int] | None = None
             if port == FAULT:
                 initial = []
@@ -163,7 +162,7 @@ def dependencies(
 
 
 def dependent_on(known: Sequence[int] | None) -> dict[str, str]:
-    """What is said of an output that depends on variables at these places; None: on all."""
+    """Return the attributes of an output that depends on these variables; None: on all."""
     if known is None:
         return {}
     return {
@@ -173,7 +172,7 @@ def dependent_on(known: Sequence[int] | None) -> dict[str, str]:
 
 
 def log_categories(fmi: str) -> Element:
-    """The categories of messages, with the statuses of a version of FMI such as `fmi2`."""
+    """Write the categories of messages; `fmi` is the prefix of statuses, such as `fmi2`."""
     categories = Element("LogCategories")
     for status in _LOGGED:
         described = f"Log messages with {fmi}{status} status."
@@ -182,9 +181,9 @@ def log_categories(fmi: str) -> Element:
     return categories
 
 
-def default_experiment(said: DefaultExperiment) -> Element:
-    """The experiment that a host runs if nothing else is asked for."""
-    times = {"startTime": said.start, "stopTime": said.stop, "stepSize": said.step}
+def default_experiment(one: DefaultExperiment) -> Element:
+    """Write the default experiment."""
+    times = {"startTime": one.start, "stopTime": one.stop, "stepSize": one.step}
     return Element("DefaultExperiment", {name: str(time) for name, time in times.items()})
 
 
@@ -197,16 +196,16 @@ _CAPABILITIES = {
     "canNotUseMemoryManagementFunctions": "true",
 }
 
-#: The file of a component's sources that includes all others.
+#: The source file that includes all others.
 SOURCE = "fmi2.c"
 
 
 def fmi2_description(model: Model, guid: str) -> bytes:
-    """The description of a model that is a library with the name of its identifier.
+    """Write the description of a model; its library is named after its identifier.
 
     Args:
-        model: that it is about.
-        guid: as the library knows it.
+        model: the model.
+        guid: the GUID that is compiled into the library.
 
     """
     root = root_of("2.0", model, guid=guid)
@@ -221,12 +220,12 @@ def fmi2_description(model: Model, guid: str) -> bytes:
 
 
 def complete(root: Element, ports: Sequence[Port]) -> Element:
-    """Fill in what the ports of a component say.
+    """Fill in the elements that depend on the ports.
 
     Args:
         root: fmiModelDescription with the elements CoSimulation, ModelVariables and
             ModelStructure.
-        ports: all, in the order of their value references.
+        ports: all ports, in the order of their value references.
 
     """
     implementation = root.find("CoSimulation")
@@ -255,7 +254,7 @@ def _add_type(parent: Element, kind: str, name: str, **said: str) -> Element:
 
 
 def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
-    """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
+    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
     outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
     for output in dependencies(ports):
         for parent, known in ((outputs, output.direct), (initial_unknowns, output.initial)):

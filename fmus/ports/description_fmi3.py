@@ -1,8 +1,8 @@
-"""What a host reads of a component in FMI 3.0: its description, its build and its terminals.
+"""XML files of FMI 3.0: modelDescription, buildDescription and terminalsAndIcons.
 
-A terminal of terminalsAndIcons.xml is a group of ports, as one thing to connect. It has the name of
-its group, or of the group that it is made to take. Components call the members of a group that they
-exchange the same, so a tool that joins two terminals of one name joins the right variables.
+A terminal is a group of ports that a tool connects as one. It has the name of its group, or of the
+group that it is meant to be connected with. Groups that components exchange have the same members,
+so a tool that connects terminals of one name connects the right variables.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from fmus.ports.description import (
 from fmus.ports.groups import slices
 from fmus.ports.port import FAULT, TIME, Port
 
-#: What FMI 3.0 calls the types of variables.
+#: Names of types in FMI 3.0.
 TYPES = {
     "Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration",
 }  # fmt: skip
@@ -43,20 +43,20 @@ _VERSION = "3.0"
 
 _CAPABILITIES = {**CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializeFMUState": "true"}
 
-#: The file of a component's sources that includes all others, and what it is written in.
+#: The source file that includes all others, and its language.
 SOURCE, _LANGUAGE = "fmi3.c", "C99"
 
-#: The platforms that a build is described for.
+#: The platforms in the build description.
 _PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin")
 
 
 def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
-    """The description of a model that is a library with the name of its identifier.
+    """Write the description of a model; its library is named after its identifier.
 
     Args:
-        model: that it is about.
-        token: as the library knows it.
-        arrays: whether vectors and matrices of one unit are variables of their own.
+        model: the model.
+        token: the instantiation token that is compiled into the library.
+        arrays: True to make vectors and matrices of one unit array variables.
 
     """
     ports = (*model.ports, FAULT, TIME)
@@ -78,14 +78,14 @@ def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
 
 
 def fmi3_build_description(name: str) -> bytes:
-    """What an importer has to compile: one file, with any compiler and no options."""
+    """Write the build description: one file to compile, with any compiler and no options."""
     root = Element("fmiBuildDescription", fmiVersion=_VERSION)
     for platform in _PLATFORMS:
         built = SubElement(root, "BuildConfiguration", modelIdentifier=name, platform=platform)
         sources = SubElement(built, "SourceFileSet", language=_LANGUAGE)
         SubElement(sources, "SourceFile", name=SOURCE)
         if platform.endswith("-linux"):
-            # There mathematics is apart from the C library.
+            # On Linux the mathematical library is separate.
             SubElement(built, "Library", name="m", external="true")
     return text(root)
 
@@ -95,7 +95,7 @@ def _add_type(parent: Element, kind: str, name: str, **said: str) -> Element:
 
 
 class _Variable(NamedTuple):
-    """A scalar, or an array, which has the value reference of its first element."""
+    """A scalar or an array; an array has the value reference of its first element."""
 
     reference: int
     port: Port
@@ -103,11 +103,11 @@ class _Variable(NamedTuple):
 
 
 def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]:
-    """Ports as variables.
+    """Return ports as variables.
 
     Args:
-        ports: in the order of their value references.
-        arrays: whether ports of one array are one variable.
+        ports: ports in the order of their value references.
+        arrays: True to join the ports of an array into one variable.
 
     """
     if not arrays:
@@ -135,7 +135,7 @@ def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]
 
 
 def _names(names: Mapping[str, str], found: Iterable[str]) -> dict[str, None]:
-    """Names of scalars as those of variables, each once."""
+    """Return the names of variables for names of scalars, each once."""
     return dict.fromkeys(names.get(one, one) for one in found)
 
 
@@ -152,7 +152,7 @@ def _variables(variables: Sequence[_Variable]) -> Element:
 
 
 def _structure(variables: Sequence[_Variable]) -> Element:
-    """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
+    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
     outputs = [*dependencies([one.port for one in variables], [one.reference for one in variables])]
     structure = Element("ModelStructure")
     for name, on in (("Output", "direct"), ("InitialUnknown", "initial")):
@@ -164,44 +164,44 @@ def _structure(variables: Sequence[_Variable]) -> Element:
 
 # Terminals
 
-#: All members of an input have to come from somewhere. Not all of an output's need to go there:
-#: a controller takes only the angles of the posture. Each terminal's rule is its own.
+#: All members of an input must be connected. Members of an output may stay unconnected: a
+#: controller takes only the angles of the posture. The rule applies to one end of a connection.
 _MATCHING_RULE = {"input": "plug", "output": "bus"}
 
-#: Outputs for inputs of other names: friction is against the velocity through the water.
+#: Outputs for inputs of other names: friction depends on the velocity through the water.
 _TAKES = {"nu": "nu_r"}
 
-#: Corners of the icon, and how many millimetres its units are on a screen.
+#: Corners of the icon, and the size of its unit on a screen [mm].
 _ICON = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
 _SCALE = "0.1"
 
-#: Where the terminals of inputs and of outputs begin, from left to right, and how large they are.
+#: Left edges of the terminals of inputs and outputs, and their size.
 _LEFT_EDGE = {"input": -110, "output": 100}
 _SIZE = 10
 
-#: What lines between signals look like in Modelica.
+#: Colour of connections between signals in Modelica.
 _COLOUR = "0 0 127"
 
-#: The picture of a terminal, beside the file, without its suffix .png.
+#: The picture of a terminal, in the folder of the file, without the suffix .png.
 _PICTURE = "terminal"
 
 
 def terminals_and_icons(ports: Sequence[Port], arrays: bool = False) -> bytes:
-    """terminalsAndIcons.xml of a component.
+    """Write terminalsAndIcons.xml of a component.
 
     Args:
-        ports: all but `fault`, which no component takes.
-        arrays: whether ports of one array are one variable.
+        ports: all ports but `fault`, which no component takes.
+        arrays: True to join the ports of an array into one variable.
 
     """
     return terminals_of({"": [variable.port for variable in variables_of(ports, arrays)]})
 
 
 def terminals_of(parts: Mapping[str, Sequence[Port]]) -> bytes:
-    """terminalsAndIcons.xml of what has several parts.
+    """Write terminalsAndIcons.xml of a model with several parts.
 
     Args:
-        parts: the ports of each, by what stands before their names, and before those of terminals.
+        parts: ports of the parts, by the prefix of the names of their variables and terminals.
 
     """
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
@@ -210,16 +210,16 @@ def terminals_of(parts: Mapping[str, Sequence[Port]]) -> bytes:
     SubElement(graphics, "Icon", _ICON)
     terminals = SubElement(root, "Terminals")
     for causality in _MATCHING_RULE:
-        of_one = {
+        chosen = {
             part: [port for port in ports if port.causality == causality]
             for part, ports in parts.items()
         }
-        terminals.extend(_terminals(of_one))
+        terminals.extend(_terminals(chosen))
     return text(root)
 
 
 def _terminals(parts: Mapping[str, Sequence[Port]]) -> list[Element]:
-    """The terminals of all inputs, or of all outputs, one below the other."""
+    """Write the terminals of all inputs, or of all outputs, one below the other."""
     groups = [
         (part, name, ports[place])
         for part, ports in parts.items()

@@ -1,4 +1,4 @@
-"""Ports from the fields of a class: what `Annotated` says of a field, and what follows from it."""
+"""Ports from the fields of a class, which `Annotated` describes."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from fmus.ports.port import Array, Misdeclared, Port
 class _Part(NamedTuple):
     """One number of a field."""
 
-    member: str  #: what it is called within the field; empty: it is all of it
-    name: str  #: of its port
+    member: str  #: its name within the field; empty if it is the whole field
+    name: str  #: name of its port
     unit: str
     type: Any
     start: Any
 
 
-#: What FMI calls the types of numbers, and where a number starts if nothing is said.
+#: Names of types in FMI, and default start values.
 _TYPES: dict[Any, tuple[str, Any]] = {
     float: ("Real", 0.0),
     int: ("Integer", 0),
     bool: ("Boolean", False),
 }
 
-#: What is said only of some.
+#: Attributes that only one causality may have.
 _ONLY = {"feedthrough": "output", "initially": "output", "tunable": "parameter"}
 
 #: An input, or a group of them, in `feedthrough`.
@@ -47,17 +47,17 @@ def declared(
     prefix: str = "",
     given: Any = None,
 ) -> dict[str, tuple[Port, ...]]:
-    """The ports of each field of a class, by the names of its fields.
+    """Return the ports of each field of a class, by the names of its fields.
 
     Args:
         made: the class, a NamedTuple.
         causality: of the ports: `input`, `output` or `parameter`.
-        direct, initial: `feedthrough` and `initially` of outputs that do not say it.
-        prefix: what the names of the ports begin with.
-        given: the start values, if they are others than those of the class.
+        direct, initial: defaults of `feedthrough` and `initially` of outputs.
+        prefix: prefix of the names of the ports.
+        given: start values, if they differ from the defaults of the class.
 
     Raises:
-        Misdeclared: a field is wrong, or says too little.
+        Misdeclared: a field is invalid or incomplete.
 
     """
     starts = dict(made._field_defaults) if given is None else given._asdict()
@@ -96,16 +96,16 @@ def _wrong(place: tuple[str, ...], why: str) -> Misdeclared:
 
 
 def _prefix(notes: tuple[Any, ...], field: str, place: tuple[str, ...]) -> str:
-    """What the names begin with of the fields of a NamedTuple that is a field."""
+    """Return the prefix of names for the fields of a NamedTuple that is a field itself."""
     found = [note for note in notes if isinstance(note, Variable)]
     if found and found != [Variable(name=found[0].name)]:
-        raise _wrong(place, "is a NamedTuple, of which a Variable says only the name")
+        raise _wrong(place, "is a NamedTuple, and its Variable may have only a name")
     name = found[0].name if found else None
     return f"{field}." if name is None else f"{name}." if name else ""
 
 
 def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner: Any) -> Variable:
-    """What a field says of its ports, if that can be said of them."""
+    """Return the Variable of a field, with its members; refuse an invalid one."""
     found = [note for note in notes if isinstance(note, Variable)]
     if len(found) != 1:
         example = f'{place[-1]}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
@@ -133,7 +133,7 @@ def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner:
 
 
 def _are_different(names: object, is_one: Any) -> bool:
-    """Whether something is a tuple of names of a kind, each once."""
+    """Return True for a tuple of different names of a kind."""
     return isinstance(names, tuple) and all(map(is_one, names)) and len({*names}) == len(names)
 
 
@@ -148,7 +148,7 @@ def _is_member(name: object) -> bool:
 
 
 def _word(hint: Any) -> str:
-    """A type as it is written."""
+    """Return the text of a type."""
     if hint in (Vector, Matrix):
         return f"{hint.__name__}, {'3' if hint is Vector else '2, 3'}"
     return word(hint)
@@ -162,7 +162,7 @@ def _parts(
     prefix: str,
     place: tuple[str, ...],
 ) -> Iterator[_Part]:
-    """The numbers of a field, in their order."""
+    """Yield the numbers of a field in order."""
     shape, number = _shape(hint, notes, place)
     if said.members and (len(shape) != 1 or shape[0] != len(said.members)):
         size = " x ".join(map(str, shape)) or "one"
@@ -176,7 +176,7 @@ def _parts(
 
 
 def _named(base: str, member: str | int, members: tuple[str | int, ...]) -> str:
-    """The name of one member of a group."""
+    """Return the name of a member of a group."""
     if "{}" in base:
         return base.replace("{}", str(member))
     if member == "":
@@ -187,7 +187,7 @@ def _named(base: str, member: str | int, members: tuple[str | int, ...]) -> str:
 def _shape(
     hint: Any, notes: tuple[Any, ...], place: tuple[str, ...]
 ) -> tuple[tuple[int, ...], Any]:
-    """How many numbers a type has along each dimension, and of which type."""
+    """Return the sizes of a type along each dimension, and the type of its numbers."""
     if hint in (Vector, Matrix):
         return sizes_in(notes), float
     if get_origin(hint) is tuple:
@@ -202,7 +202,7 @@ def _shape(
 
 
 def _places(shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """The indices of all numbers, from one."""
+    """Yield the indices of all numbers, from one."""
     if not shape:
         yield ()
         return
@@ -211,7 +211,7 @@ def _places(shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
 
 
 def _flat(start: Any, shape: tuple[int, ...], place: tuple[str, ...]) -> Iterator[Any]:
-    """The numbers of a start value that has this shape."""
+    """Yield the numbers of a start value of this shape."""
     if not shape:
         yield start
     elif not isinstance(start, tuple) or len(start) != shape[0]:
@@ -222,7 +222,7 @@ def _flat(start: Any, shape: tuple[int, ...], place: tuple[str, ...]) -> Iterato
 
 
 def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -> Port:
-    kind, start, choices = _meant(part, place)
+    kind, start, choices = _fmi_type(part, place)
     if kind != "Real" and part.unit != "1":
         raise _wrong(place, f"is of the type {_word(part.type)}; only a float has a unit")
     variability = "tunable" if said.tunable else "fixed"
@@ -253,8 +253,8 @@ def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -
     return replace(port, start=None) if causality == "output" else port
 
 
-def _meant(part: _Part, place: tuple[str, ...]) -> tuple[str, Any, dict[str, int]]:
-    """FMI's type of a number, its start value, and its choices."""
+def _fmi_type(part: _Part, place: tuple[str, ...]) -> tuple[str, Any, dict[str, int]]:
+    """Return FMI's type of a number, its start value, and its choices."""
     number, start = part.type, part.start
     if number in _TYPES:
         kind, zero = _TYPES[number]

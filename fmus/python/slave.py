@@ -1,7 +1,7 @@
 """The slave of a component, made from its definition.
 
-Its methods are written out and compiled, because they run once a step: `advance` of a component
-that derives something of its state, may restart, and splits its steps becomes
+Its methods are generated and compiled, because they run once a step. For a component with the hooks
+`derive`, `credible` and `restarted` and with `H_MAX`, `advance` is
 
     def advance(self, state, derived, inputs, t, h, n):
         if derived is None:
@@ -16,7 +16,7 @@ that derives something of its state, may restart, and splits its steps becomes
             known = None
         return state, None
 
-and the method of a simpler one is shorter by what it lacks.
+A simpler component gets only the lines that it needs.
 """
 
 from __future__ import annotations
@@ -47,14 +47,14 @@ from fmus.python.state import measuring
 
 @cache
 def slave_of(name: str, module: ModuleType) -> type[Component]:
-    """The class of a component, the same each time: an FMU's script asks once an instance.
+    """Return the class of a component; it is cached, since each instance of an FMU asks for it.
 
     Args:
-        name: of the component.
-        module: that says it all.
+        name: name of the component.
+        module: its module.
 
     Raises:
-        Misdeclared: it is no component.
+        Misdeclared: it is not a component.
 
     """
     definition = define(name, module)
@@ -92,16 +92,16 @@ def slave_of(name: str, module: ModuleType) -> type[Component]:
     for method in methods:
         exec(method, scope, members)
     made = type(name, (Component,), members)
-    # PythonFMU looks methods up by names that miss Python's cache: the first class has them.
+    # PythonFMU's look-ups miss Python's method cache, so these are found in the first class.
     for method in ("do_step", "get_real", "set_real", "get_boolean"):
         setattr(made, method, getattr(made, method))
     return made
 
 
-#: Hooks that a method does nothing but call.
+#: Hooks with a method that only calls them.
 _PLAIN = ("start", "check", "check_state", "seed")
 
-#: Hooks of a guard.
+#: Hooks that replace a state that is not credible.
 _GUARD = ("credible", "restarted")
 
 _EVALUATE = ("state", "derived", "inputs", "t", "draws")
@@ -109,18 +109,18 @@ _ADVANCE = ("state", "derived", "inputs", "t", "h", "n")
 
 
 def _made_of(said: Behaviour, *hooks: str) -> frozenset[str]:
-    """What the results of hooks change with."""
+    """Return the arguments that the results of hooks depend on."""
     known = ("inputs", "parameters", "t", "state")
     return frozenset(one for one in known if any(said.takes(hook, one) for hook in hooks))
 
 
 def _method(name: str, arguments: tuple[str, ...], lines: Iterator[str] | list[str]) -> str:
-    """The text of a method."""
+    """Return the text of a method."""
     return "\n    ".join([f"def {name}({', '.join(('self', *arguments))}):", *lines])
 
 
 def _call(said: Behaviour, hook: str, **given: str) -> str:
-    """A call of a hook in a method that has its arguments, and the parameters."""
+    """Return the call of a hook in a method with the same names of arguments."""
     given = {"parameters": "self.parameters", **given}
     return f"{hook}({', '.join(given.get(name, name) for name in said.arguments(hook))})"
 
@@ -130,7 +130,7 @@ def _plain(said: Behaviour, hook: str) -> Iterator[str]:
 
 
 def _known(said: Behaviour, hook: str) -> Iterator[str]:
-    """How what a hook needs is found out, once."""
+    """Yield statements that compute the derived values for a hook, once."""
     derive = _call(said, "derive") if "derived" in said.arguments(hook) else "None"
     if said.hooks["credible"]:
         yield from _guarded(said, derive)
@@ -139,7 +139,7 @@ def _known(said: Behaviour, hook: str) -> Iterator[str]:
 
 
 def _guarded(said: Behaviour, derive: str) -> Iterator[str]:
-    """How a guard finds out, once, of which state something is derived; that is `known` then."""
+    """Yield statements that choose a credible state, once; `known` are its derived values."""
     yield "if derived is None:"
     yield f"    good = {_call(said, 'credible')}"
     yield f"    if not good: state = {_call(said, 'restarted')}"
@@ -148,10 +148,10 @@ def _guarded(said: Behaviour, derive: str) -> Iterator[str]:
 
 
 def _advance(said: Behaviour) -> Iterator[str]:
-    """How a run goes on."""
+    """Yield the statements of `advance`."""
     derived = "derived"
     if said.hooks["credible"]:
-        # It is told before `derive`, which may refuse the step.
+        # Log the restart before `derive`, which may refuse the step.
         yield from _guarded(said, "None")
         yield "if not good: self.log_once(RESTARTED.format(t=t), warning, RESTARTED)"
         derived = "known"
@@ -171,7 +171,7 @@ def _advance(said: Behaviour) -> Iterator[str]:
 
 
 def _evaluate(definition: Definition, scope: dict[str, Any]) -> Iterator[str]:
-    """How outputs are evaluated; the names that it needs are put into the scope."""
+    """Yield the statements of `evaluate`, and add the names that they need to the scope."""
     said = definition.behaviour
     yield from _known(said, "outputs")
     groups = {name: f"_{name}" for name in hints_of(said.outputs)}
@@ -183,6 +183,6 @@ def _evaluate(definition: Definition, scope: dict[str, Any]) -> Iterator[str]:
         noisy = groups[said.noisy]
         yield f"{noisy} = {_call(said, 'measured', **{'n': n, said.noisy: noisy})}"
     yield f"values = {packed(said.outputs, groups)}"
-    # What is finite may still be too large to be added up.
+    # The sum of finite values may be infinite.
     yield "if not isfinite(sum(values)): self._store.check_outputs(values)"
     yield "return derived, values"

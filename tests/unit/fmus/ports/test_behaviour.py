@@ -117,7 +117,11 @@ def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, 
             f"{SEED}{MEASURED}\n\ndef _moved".replace(", y: tuple[float, float])", ")"),
             "measured takes 0 groups of outputs, not one",
         ),
-        ("def _moved", "seed = measured = 1\n\n\ndef _moved", "seed is no function, but has the"),
+        (
+            "def _moved",
+            "seed = measured = 1\n\n\ndef _moved",
+            "seed is not a function, but has the",
+        ),
         (
             "start(parameters: Gains)",
             "start(parameters: State)",

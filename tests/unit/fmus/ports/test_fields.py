@@ -136,7 +136,9 @@ def test_the_name_of_a_class_in_a_class_may_be_another_or_none():
     ]  # fmt: skip
     [first, *_] = ports("parameter", p=(Annotated[Gains, Variable(name="a.b")], Gains()))
     assert first.name == "a.b.k"
-    with pytest.raises(Misdeclared, match=r"^Fields.p is a NamedTuple, of which a Variable says"):
+    with pytest.raises(
+        Misdeclared, match=r"^Fields.p is a NamedTuple, and its Variable may have only"
+    ):
         ports("parameter", p=(Annotated[Gains, PLAIN], Gains()))
 
 
