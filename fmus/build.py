@@ -30,10 +30,10 @@ from fmus.python.packaging import LOADERS, PythonKind, best_loader, build_script
 from fmus.script import (
     data_files,
     is_component,
+    message_of,
     no_component,
     script_in,
     source_of_script,
-    message_of,
 )
 from orchestrator.machine.compilers import compiler_for, platforms
 

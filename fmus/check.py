@@ -25,7 +25,7 @@ from fmus.native.packaging import MAIN, fmu_entries
 from fmus.ports import reducer
 from fmus.ports.behaviour import HOOKS
 from fmus.python.packaging import PythonKind
-from fmus.script import is_component, no_component, script_in, source_of_script, message_of
+from fmus.script import is_component, message_of, no_component, script_in, source_of_script
 from orchestrator.machine.compilers import Compiler, check_sources
 
 

@@ -54,9 +54,9 @@ static void call_logger(const logger *host, string name, int status, string cate
     free(format);
 }
 
-/* The logger for PythonFMU. An entry of the category "answer" is not a message: it passes the status
- * of the call, which PythonFMU cannot return, and, as hexadecimal digits of a double's bits, the
- * present time, if that does not follow from the arguments. */
+/* The logger for PythonFMU. An entry of the category "answer" is not a message: it passes the
+ * status of the call, which PythonFMU cannot return, and, as hexadecimal digits of a double's bits,
+ * the present time, if that does not follow from the arguments. */
 static void log_of_slave(void *environment, string name, int status, string category, string text,
                          ...) {
     instance *it = environment;
@@ -121,8 +121,8 @@ static void *new_slave(instance *it, string guid, string path, int visible, mess
     typedef void *(*instantiate)(string, int, string, string, const callbacks *, int, int);
     instantiate forward = (instantiate)pythonfmu_function("fmi2Instantiate");
     void *slave = forward(it->host.name, CO_SIMULATION, guid, path, &it->heard, visible, 1);
-    /* Free PythonFMU's guard of the interpreter, which PythonFMU did not start, and would free twice
-     * at the end of the process. */
+    /* Free PythonFMU's guard of the interpreter, which PythonFMU did not start, and would free
+     * twice at the end of the process. */
     ((void (*)(void))pythonfmu_function("finalizePythonInterpreter"))();
     if (take_exception(why) && slave != NULL) {
         free_slave(slave);
@@ -214,7 +214,7 @@ static void take_answer(call *this) {
 static void leave(call *this) {
     instance *it = this->instance;
     message why;
-    /* PythonFMU ignores some exceptions and leaves them set; a Python host would find them later. */
+    /* PythonFMU ignores some exceptions and leaves them set, where a Python host finds them. */
     if (take_exception(&why) && this->status < FMI_ERROR) check(this, why.text);
     if (this->status == FMI_FATAL && !it->is_lost) {
         it->is_lost = 1;

@@ -1,8 +1,8 @@
 /* Finds and starts Python, once a process.
  *
  * Each FMU has its own loader, and hosts instantiate FMUs from several threads. All loaders of a
- * process share one object: the dynamic linker resolves symbols of the type gnu_unique_object to the
- * same address in all libraries, even in those loaded with RTLD_LOCAL.
+ * process share one object: the dynamic linker resolves symbols of the type gnu_unique_object to
+ * the same address in all libraries, even in those loaded with RTLD_LOCAL.
  *
  * The interpreter starts isolated: environment variables do not affect it, and it handles no signal
  * of the host. If it cannot start, the reason is logged, and the process continues. It is never
