@@ -1,4 +1,4 @@
-"""The native kind: an FMU that holds libraries, and their sources in C."""
+"""The native kind: FMUs with libraries and their sources in C."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from orchestrator.machine.compilers import Compiler, Platform, library
 
 _FOLDER = Path(__file__).parent
 
-#: The file to compile, by the version of FMI: it includes all others.
+#: The source file to compile, by the version of FMI; it includes all others.
 MAIN: dict[str, str] = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))
 
 _IDENTITY = """\
-/* Which FMU this is. */
+/* The name and GUID of this FMU. */
 #ifndef IDENTITY_H
 #define IDENTITY_H
 
@@ -44,14 +44,14 @@ def _described(model: Model, guid: str, fmi: str, arrays: bool) -> bytes:
 
 
 class Parts(NamedTuple):
-    """What a native FMU is made of.
+    """Parts of a native FMU.
 
     Attributes:
-        model: what its description says.
+        model: content of its description.
         equations, tables: the files equations.c and ports.h.
-        documents: what it holds for its user, by the places in it.
-        terminals: of FMI 3.0, the file terminalsAndIcons.xml.
-        arrays: whether vectors and matrices of one unit are variables of FMI 3.0.
+        documents: documentation and reference results, by their paths in the FMU.
+        terminals: the file terminalsAndIcons.xml of FMI 3.0.
+        arrays: True if vectors and matrices of one unit are array variables of FMI 3.0.
 
     """
 
@@ -64,7 +64,7 @@ class Parts(NamedTuple):
 
 
 def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
-    """What a version of FMI has besides, nearly all of it to be drawn."""
+    """Return icons, and for FMI 3.0 the build description and terminals."""
     icon = documentation.ICON.read_bytes()
     if fmi == FMI_VERSIONS[0]:
         return {"model.png": icon}
@@ -80,12 +80,12 @@ def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
 def sources(
     definition: Definition, fmi: str = FMI_VERSIONS[0], arrays: bool = False
 ) -> dict[str, str]:
-    """The C sources of a component by their names, all but identity.h."""
+    """Return the C sources of a component by their file names, except identity.h."""
     return sources_of(translated(definition), tables(definition, arrays), fmi)
 
 
 def sources_of(equations: str, ports: str, fmi: str) -> dict[str, str]:
-    """The C sources of a version of FMI by their names, with equations.c and ports.h."""
+    """Return the C sources for a version of FMI by their file names, except identity.h."""
     others = {name for version, name in MAIN.items() if version != fmi}
     return {
         **{
@@ -103,18 +103,18 @@ def fmu_entries(
     fmi: str,
     platforms: Sequence[Platform],
     compiler: Compiler,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
     arrays: bool = False,
 ) -> dict[str, bytes]:
-    """The contents of the FMU of a component.
+    """Return the contents of the FMU of a component.
 
     Args:
-        source: of the component.
-        fmi: version.
-        platforms: that it has libraries for.
-        compiler: that makes them.
-        tell: called with a line when a library is made.
-        arrays: whether vectors and matrices of one unit are variables of FMI 3.0.
+        source: source of the component.
+        fmi: version of FMI.
+        platforms: platforms of its libraries.
+        compiler: compiler for the libraries.
+        report: called with a line when a library was compiled.
+        arrays: True to make vectors and matrices of one unit array variables of FMI 3.0.
 
     Raises:
         OSError: the compiler fails.
@@ -123,7 +123,7 @@ def fmu_entries(
     definition = source.definition
     documents = documentation.fmu_documents(source, NATIVE, fmi)
     if arrays:
-        # The reference results that it would carry are of scalars.
+        # The reference results are for scalar variables.
         documents = {name: text for name, text in documents.items() if name.endswith(".html")}
     parts = Parts(
         definition,
@@ -133,7 +133,7 @@ def fmu_entries(
         description_fmi3.terminals_and_icons(definition.ports, arrays),
         arrays,
     )
-    return entries_of(parts, fmi, platforms, compiler, tell)
+    return entries_of(parts, fmi, platforms, compiler, report)
 
 
 def entries_of(
@@ -141,18 +141,18 @@ def entries_of(
     fmi: str,
     platforms: Sequence[Platform],
     compiler: Compiler,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> dict[str, bytes]:
-    """The contents of an FMU.
+    """Return the contents of an FMU.
 
     Its GUID follows from its description and its sources, and is the same for all platforms.
 
     Args:
-        parts: that it is made of.
-        fmi: version.
-        platforms: that it has libraries for.
-        compiler: that makes them.
-        tell: called with a line when a library is made.
+        parts: parts of the FMU.
+        fmi: version of FMI.
+        platforms: platforms of its libraries.
+        compiler: compiler for the libraries.
+        report: called with a line when a library was compiled.
 
     Raises:
         OSError: the compiler fails.
@@ -168,7 +168,7 @@ def entries_of(
     for platform in platforms:
         path = f"binaries/{platform.name}/{name}{platform.ending}"
         libraries[path] = library(compiler, platform, name, written, MAIN[fmi])
-        tell(f"{model.name} for {platform.name}, FMI {fmi}.0")
+        report(f"{model.name} for {platform.name}, FMI {fmi}.0")
     return {
         "modelDescription.xml": describe(guid),
         **_pictures(parts, fmi),
@@ -181,20 +181,20 @@ def entries_of(
 
 @dataclass(frozen=True)
 class NativeKind:
-    """The native kind, for some platforms; a line tells of each library that is made."""
+    """The native kind for some platforms; `report` gets a line for each compiled library."""
 
     fmi: str
     platforms: Sequence[Platform]
     compiler: Compiler
-    tell: Callable[[str], None]
+    report: Callable[[str], None]
     arrays: bool = False
     name = NATIVE
-    #: How many are written at the same time: compilers are processes of their own.
+    #: Number of FMUs that are written in parallel: compilers are separate processes.
     side_by_side = os.cpu_count()
 
     @property
     def settings(self) -> dict[str, str]:
-        """What the FMUs depend on besides their sources."""
+        """Settings that the FMUs depend on in addition to their sources."""
         return {
             "kind": NATIVE,
             "fmi": self.fmi,
@@ -211,6 +211,6 @@ class NativeKind:
 
         """
         entries = fmu_entries(
-            source, self.fmi, self.platforms, self.compiler, self.tell, self.arrays
+            source, self.fmi, self.platforms, self.compiler, self.report, self.arrays
         )
         write_archive(path, entries)

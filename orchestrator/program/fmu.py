@@ -27,9 +27,8 @@ from fmus.discovery import write_archive
 from fmus.documentation import html_of, page_of
 from fmus.language.types import FLOAT, INT, Scalar, Type, count
 from fmus.native.emit import closed, number_in_c, quoted
-from fmus.native.numbers import has_only_doubles, moves
 from fmus.native.packaging import Parts, entries_of
-from fmus.native.pieces import array, function, structure
+from fmus.native.pieces import array, function, has_only_doubles, moves, structure
 from fmus.native.tables import places_of, port_tables
 from fmus.native.translator import constants, defined
 from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, check_enumerations
