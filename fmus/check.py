@@ -21,9 +21,10 @@ from fmus.discovery import Source, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from fmus.language.build import Program, Untranslatable, position
 from fmus.language.types import PLACED
-from fmus.native.packaging import MAIN, fmu_entries
+from fmus.native.packaging import fmu_entries
 from fmus.ports import reducer
 from fmus.ports.behaviour import HOOKS
+from fmus.ports.description import SOURCES
 from fmus.python.packaging import PythonKind
 from fmus.script import is_component, message_of, no_component, script_in, source_of_script
 from orchestrator.machine.compilers import Compiler, check_sources
@@ -94,7 +95,7 @@ def write(source: Source, folder: Path) -> None:
         texts = {
             name.removeprefix(head): text for name, text in entries.items() if name.startswith(head)
         }
-        check_sources(source.name, texts, MAIN[fmi])
+        check_sources(source.name, texts, SOURCES[fmi])
         write_archive(folder / f"{NATIVE}-{fmi}.fmu", entries)
     PythonKind("plain").write(source, folder / f"{PYTHON}.fmu")
 

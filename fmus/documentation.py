@@ -17,7 +17,7 @@ from auv_fmu.language.variable import POSITIVE
 from fmus.discovery import Source, related_files
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.definition import Model
-from fmus.ports.description_fmi3 import TYPES
+from fmus.ports.description import TYPES
 from fmus.ports.port import FAULT, Port
 
 #: The icon of every component.

@@ -16,14 +16,17 @@ from fmus.native.emit import quoted
 from fmus.native.names import RUNTIME
 from fmus.native.tables import tables
 from fmus.native.translator import translated
-from fmus.ports import description, description_fmi3
 from fmus.ports.definition import Definition, Model
+from fmus.ports.description import (
+    SOURCES,
+    fmi2_description,
+    fmi3_build_description,
+    fmi3_description,
+)
+from fmus.ports.terminals import terminals_and_icons
 from orchestrator.machine.compilers import Compiler, Platform, library
 
 _FOLDER = Path(__file__).parent
-
-#: The source file to compile, by the version of FMI; it includes all others.
-MAIN: dict[str, str] = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))
 
 _IDENTITY = """\
 /* The name and GUID of this FMU. */
@@ -39,8 +42,8 @@ _IDENTITY = """\
 
 def _described(model: Model, guid: str, fmi: str, arrays: bool) -> bytes:
     if fmi == FMI_VERSIONS[0]:
-        return description.fmi2_description(model, guid)
-    return description_fmi3.fmi3_description(model, guid, arrays)
+        return fmi2_description(model, guid)
+    return fmi3_description(model, guid, arrays)
 
 
 class Parts(NamedTuple):
@@ -68,7 +71,7 @@ def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
     icon = documentation.ICON.read_bytes()
     if fmi == FMI_VERSIONS[0]:
         return {"model.png": icon}
-    build = description_fmi3.fmi3_build_description(parts.model.identifier)
+    build = fmi3_build_description(parts.model.identifier)
     return {
         "sources/buildDescription.xml": build,
         "terminalsAndIcons/terminalsAndIcons.xml": parts.terminals,
@@ -86,7 +89,7 @@ def sources(
 
 def sources_of(equations: str, ports: str, fmi: str) -> dict[str, str]:
     """Return the C sources for a version of FMI by their file names, except identity.h."""
-    others = {name for version, name in MAIN.items() if version != fmi}
+    others = {name for version, name in SOURCES.items() if version != fmi}
     return {
         **{
             path.name: path.read_text(encoding="utf-8")
@@ -130,7 +133,7 @@ def fmu_entries(
         translated(definition),
         tables(definition, arrays),
         documents,
-        description_fmi3.terminals_and_icons(definition.ports, arrays),
+        terminals_and_icons(definition.ports, arrays),
         arrays,
     )
     return entries_of(parts, fmi, platforms, compiler, report)
@@ -167,7 +170,7 @@ def entries_of(
     libraries = {}
     for platform in platforms:
         path = f"binaries/{platform.name}/{name}{platform.ending}"
-        libraries[path] = library(compiler, platform, name, written, MAIN[fmi])
+        libraries[path] = library(compiler, platform, name, written, SOURCES[fmi])
         report(f"{model.name} for {platform.name}, FMI {fmi}.0")
     return {
         "modelDescription.xml": describe(guid),

@@ -12,7 +12,7 @@ from auv_fmu.paper import euler
 from fmus.language.types import Record, Type, type_of
 from fmus.native.emit import members, quoted
 from fmus.ports.definition import Definition
-from fmus.ports.description_fmi3 import variables_of
+from fmus.ports.description import variables_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, Port
 

@@ -10,7 +10,7 @@ module                   content
 :mod:`.behaviour`        hooks and constants of a component
 :mod:`.reducer`          hooks and results of an index
 :mod:`.definition`       the whole definition of a component
-:mod:`.description`      modelDescription.xml of FMI 2.0, and the parts common to all versions
-:mod:`.description_fmi3` XML files of FMI 3.0: description, build, terminals
+:mod:`.description`      modelDescription.xml of both versions, buildDescription.xml
+:mod:`.terminals`        terminalsAndIcons.xml of FMI 3.0
 ======================== =================================================================
 """

@@ -1,4 +1,4 @@
-"""modelDescription.xml of FMI 2.0 for both kinds of FMU, and the parts common to all versions.
+"""modelDescription.xml of both versions of FMI, and buildDescription.xml.
 
 The root element is written by PythonFMU or here; its content follows from the ports.
 """
@@ -6,24 +6,29 @@ The root element is written by PythonFMU or here; its content follows from the p
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import count
+from dataclasses import replace
+from itertools import count, groupby
+from operator import itemgetter
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from auv_fmu import __version__
 from fmus.ports.definition import DefaultExperiment, Model
-from fmus.ports.port import FAULT, Port, Value
+from fmus.ports.port import FAULT, TIME, Port, Value
 from fmus.ports.units import unit_of
 
 #: Attribute that is true if steps may differ in size.
 _ANY_STEP = "canHandleVariableCommunicationStepSize"
 
 #: Capabilities with the same name in all versions of FMI.
-CAPABILITIES = {
+_CAPABILITIES = {
     "needsExecutionTool": "false",
     "canBeInstantiatedOnlyOncePerProcess": "false",
     _ANY_STEP: "true",
 }
+
+#: The source file that includes all others, by version of FMI.
+SOURCES: Mapping[str, str] = {"2": "fmi2.c", "3": "fmi3.c"}
 
 #: Statuses of messages that have a category.
 _LOGGED = ("Warning", "Discard", "Error", "Fatal")
@@ -48,12 +53,12 @@ def _literal(value: Value) -> str:
     return repr(float(value)).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
-def capabilities_of(model: Model, known: Mapping[str, str]) -> dict[str, str]:
+def _capabilities(model: Model, known: Mapping[str, str]) -> dict[str, str]:
     """Return capabilities, with the one that depends on the model."""
     return {**known, _ANY_STEP: str(model.experiment.takes_any_step).lower()}
 
 
-def root_of(version: str, model: Model, **identity: str) -> Element:
+def _root(version: str, model: Model, **identity: str) -> Element:
     """Make the root of a description; `identity` is the guid or token."""
     attributes = {
         "fmiVersion": version,
@@ -67,14 +72,14 @@ def root_of(version: str, model: Model, **identity: str) -> Element:
     return Element("fmiModelDescription", attributes)
 
 
-def text(root: Element) -> bytes:
+def document(root: Element) -> bytes:
     """Write a document, whose bytes depend only on its elements."""
     indent(root)
     content: bytes = tostring(root, encoding="utf-8")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + content + b"\n"
 
 
-def variable_attributes(reference: int, port: Port) -> dict[str, str]:
+def _variable_attributes(reference: int, port: Port) -> dict[str, str]:
     """Return the attributes of a variable that do not describe its values."""
     attributes = {
         "name": port.name,
@@ -103,7 +108,7 @@ def value_attributes(port: Port) -> dict[str, str]:
     }
 
 
-def units_of(ports: Sequence[Port]) -> list[str]:
+def _units(ports: Sequence[Port]) -> list[str]:
     """Return the units of ports, each once."""
     return sorted({port.unit for port in ports if port.unit})
 
@@ -112,23 +117,23 @@ def unit_definitions(units: Sequence[str]) -> Element:
     """Write units in terms of base units."""
     definitions = Element("UnitDefinitions")
     for unit in units:
-        defined, said = SubElement(definitions, "Unit", name=unit), unit_of(unit)
-        if said.exponents is None:
+        defined, parsed = SubElement(definitions, "Unit", name=unit), unit_of(unit)
+        if parsed.exponents is None:
             continue
-        base = {name: str(exponent) for name, exponent in said.exponents.items()}
-        if said.factor != 1.0:
-            base["factor"] = _literal(said.factor)
-        if said.offset:
-            base["offset"] = _literal(said.offset)
+        base = {name: str(exponent) for name, exponent in parsed.exponents.items()}
+        if parsed.factor != 1.0:
+            base["factor"] = _literal(parsed.factor)
+        if parsed.offset:
+            base["offset"] = _literal(parsed.offset)
         # Some tools cannot read an element without attributes; a factor of 1 is the default.
         SubElement(defined, "BaseUnit", base or {"factor": "1"})
     return definitions
 
 
-def type_definitions(ports: Sequence[Port], add: Callable[..., Element]) -> Element:
+def _type_definitions(ports: Sequence[Port], add: Callable[..., Element]) -> Element:
     """Write the types of units and enumerations; `add` adds the element of a type."""
     definitions = Element("TypeDefinitions")
-    for unit in units_of(ports):
+    for unit in _units(ports):
         name = unit_of(unit).type_name
         add(definitions, "Real", name, quantity=name, unit=unit)
     for name, choices in {port.enumeration: port.choices for port in ports if port.choices}.items():
@@ -161,7 +166,7 @@ def dependencies(
             yield Dependency(places[port.name], direct, initial)
 
 
-def dependent_on(known: Sequence[int] | None) -> dict[str, str]:
+def _dependent_on(known: Sequence[int] | None) -> dict[str, str]:
     """Return the attributes of an output that depends on these variables; None: on all."""
     if known is None:
         return {}
@@ -171,7 +176,7 @@ def dependent_on(known: Sequence[int] | None) -> dict[str, str]:
     }
 
 
-def log_categories(fmi: str) -> Element:
+def _log_categories(fmi: str) -> Element:
     """Write the categories of messages; `fmi` is the prefix of statuses, such as `fmi2`."""
     categories = Element("LogCategories")
     for status in _LOGGED:
@@ -181,7 +186,7 @@ def log_categories(fmi: str) -> Element:
     return categories
 
 
-def default_experiment(one: DefaultExperiment) -> Element:
+def _default_experiment(one: DefaultExperiment) -> Element:
     """Write the default experiment."""
     times = {"startTime": one.start, "stopTime": one.stop, "stepSize": one.step}
     return Element("DefaultExperiment", {name: str(time) for name, time in times.items()})
@@ -189,15 +194,12 @@ def default_experiment(one: DefaultExperiment) -> Element:
 
 # FMI 2.0
 
-_CAPABILITIES = {
-    **CAPABILITIES,
+_CAPABILITIES_2 = {
+    **_CAPABILITIES,
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
     "canNotUseMemoryManagementFunctions": "true",
 }
-
-#: The source file that includes all others.
-SOURCE = "fmi2.c"
 
 
 def fmi2_description(model: Model, guid: str) -> bytes:
@@ -208,15 +210,15 @@ def fmi2_description(model: Model, guid: str) -> bytes:
         guid: the GUID that is compiled into the library.
 
     """
-    root = root_of("2.0", model, guid=guid)
+    root = _root("2.0", model, guid=guid)
     implementation = SubElement(root, "CoSimulation", modelIdentifier=model.identifier)
-    SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCE)
-    root.extend((log_categories("fmi2"), default_experiment(model.experiment)))
+    SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCES["2"])
+    root.extend((_log_categories("fmi2"), _default_experiment(model.experiment)))
     SubElement(root, "ModelVariables")
     SubElement(root, "ModelStructure")
     complete(root, (*model.ports, FAULT))
-    implementation.attrib.update(capabilities_of(model, implementation.attrib))
-    return text(root)
+    implementation.attrib.update(_capabilities(model, implementation.attrib))
+    return document(root)
 
 
 def complete(root: Element, ports: Sequence[Port]) -> Element:
@@ -232,11 +234,11 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
     variables = root.find("ModelVariables")
     structure = root.find("ModelStructure")
     assert implementation is not None and variables is not None and structure is not None
-    implementation.attrib.update(_CAPABILITIES)
+    implementation.attrib.update(_CAPABILITIES_2)
     variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
     structure[:] = _structure(ports)
-    types = type_definitions(ports, _add_type)
-    if units := units_of(ports):
+    types = _type_definitions(ports, _add_type)
+    if units := _units(ports):
         root.insert(1, unit_definitions(units))
     if len(types):
         root.insert(1 + bool(units), types)
@@ -244,7 +246,7 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
 
 
 def _variable(reference: int, port: Port) -> Element:
-    variable = Element("ScalarVariable", variable_attributes(reference, port))
+    variable = Element("ScalarVariable", _variable_attributes(reference, port))
     SubElement(variable, port.type, value_attributes(port))
     return variable
 
@@ -258,5 +260,130 @@ def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
     outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
     for output in dependencies(ports):
         for parent, known in ((outputs, output.direct), (initial_unknowns, output.initial)):
-            SubElement(parent, "Unknown", dependent_on(known), index=str(output.number))
+            SubElement(parent, "Unknown", _dependent_on(known), index=str(output.number))
     return outputs, initial_unknowns
+
+
+# FMI 3.0
+
+#: Names of types in FMI 3.0.
+TYPES = {
+    "Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration",
+}  # fmt: skip
+
+_CAPABILITIES_3 = {**_CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializeFMUState": "true"}
+
+#: The platforms in the build description.
+_PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin")
+
+
+def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
+    """Write the description of a model; its library is named after its identifier.
+
+    Args:
+        model: the model.
+        token: the instantiation token that is compiled into the library.
+        arrays: True to make vectors and matrices of one unit array variables.
+
+    """
+    ports = (*model.ports, FAULT, TIME)
+    variables = variables_of(ports, arrays)
+    root = _root("3.0", model, instantiationToken=token)
+    capabilities = _capabilities(model, _CAPABILITIES_3)
+    SubElement(root, "CoSimulation", capabilities, modelIdentifier=model.identifier)
+    root.extend(
+        (
+            unit_definitions(_units(ports)),
+            _type_definitions(ports, _add_type_3),
+            _log_categories("fmi3"),
+            _default_experiment(model.experiment),
+            _variables(variables),
+            _structure_3(variables),
+        )
+    )
+    return document(root)
+
+
+def fmi3_build_description(name: str) -> bytes:
+    """Write the build description: one file to compile, with any compiler and no options."""
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    for platform in _PLATFORMS:
+        built = SubElement(root, "BuildConfiguration", modelIdentifier=name, platform=platform)
+        sources = SubElement(built, "SourceFileSet", language="C99")
+        SubElement(sources, "SourceFile", name=SOURCES["3"])
+        if platform.endswith("-linux"):
+            # On Linux the mathematical library is separate.
+            SubElement(built, "Library", name="m", external="true")
+    return document(root)
+
+
+def _add_type_3(parent: Element, kind: str, name: str, **said: str) -> Element:
+    return SubElement(parent, f"{TYPES[kind]}Type", {"name": name, **said})
+
+
+class _Variable(NamedTuple):
+    """A scalar or an array; an array has the value reference of its first element."""
+
+    reference: int
+    port: Port
+    elements: Sequence[Port]
+
+
+def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]:
+    """Return ports as variables.
+
+    Args:
+        ports: ports in the order of their value references.
+        arrays: True to join the ports of an array into one variable.
+
+    """
+    if not arrays:
+        ports = [replace(port, array=None) for port in ports]
+    names = {port.name: port.array.name if port.array else port.name for port in ports}
+    keyed = [(names[port.name], place, port) for place, port in enumerate(ports, start=1)]
+    variables = []
+    for name, found in groupby(keyed, itemgetter(0)):
+        members = [*found]
+        _, reference, first = members[0]
+        elements = [port for _, _, port in members]
+        described = first.array.description if first.array else first.description
+        direct = tuple(_names(names, (name for port in elements for name in port.feedthrough)))
+        initial = _names(names, (name for port in elements for name in port.initially or ()))
+        later = tuple(one for one in initial if one not in direct)
+        whole = replace(
+            first,
+            name=name,
+            description=described,
+            feedthrough=direct,
+            initially=None if first.initially is None else later,
+        )
+        variables.append(_Variable(reference, whole, elements))
+    return variables
+
+
+def _names(names: Mapping[str, str], found: Iterable[str]) -> dict[str, None]:
+    """Return the names of variables for names of scalars, each once."""
+    return dict.fromkeys(names.get(one, one) for one in found)
+
+
+def _variables(variables: Sequence[_Variable]) -> Element:
+    root = Element("ModelVariables")
+    for reference, port, elements in variables:
+        attributes = {**_variable_attributes(reference, port), **value_attributes(port)}
+        if port.start is not None:
+            attributes["start"] = " ".join(value_attributes(one)["start"] for one in elements)
+        variable = SubElement(root, TYPES[port.type], attributes)
+        for size in port.array.shape if port.array else ():
+            SubElement(variable, "Dimension", start=str(size))
+    return root
+
+
+def _structure_3(variables: Sequence[_Variable]) -> Element:
+    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
+    outputs = [*dependencies([one.port for one in variables], [one.reference for one in variables])]
+    structure = Element("ModelStructure")
+    for name, on in (("Output", "direct"), ("InitialUnknown", "initial")):
+        for output in outputs:
+            known = _dependent_on(getattr(output, on))
+            SubElement(structure, name, known, valueReference=str(output.number))
+    return structure

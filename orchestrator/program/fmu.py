@@ -32,9 +32,9 @@ from fmus.native.pieces import array, function, has_only_doubles, moves, structu
 from fmus.native.tables import places_of, port_tables
 from fmus.native.translator import constants, defined
 from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, check_enumerations
-from fmus.ports.description_fmi3 import terminals_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
+from fmus.ports.terminals import terminals_of
 from orchestrator.cosim import Plan, PortName, Visit
 from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.compilers import platforms as platforms_of

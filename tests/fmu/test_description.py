@@ -19,13 +19,13 @@ from lxml import etree
 from auv_fmu.language.quantities import group_name
 from fmus.discovery import components, package_folder, source_of
 from fmus.kinds import NATIVE, PYTHON
-from fmus.ports.description import fmi2_description
-from fmus.ports.description_fmi3 import (
+from fmus.ports.description import (
+    fmi2_description,
     fmi3_build_description,
     fmi3_description,
-    terminals_and_icons,
 )
 from fmus.ports.port import TIME
+from fmus.ports.terminals import terminals_and_icons
 from support.raw import Library, Status, instance
 from support.settings import ports_of
 

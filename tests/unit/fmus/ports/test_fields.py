@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from auv_fmu import POSITIVE, Matrix, Variable, Vector
 from fmus.ports.definition import DefaultExperiment, Definition, Origin
-from fmus.ports.description import fmi2_description
-from fmus.ports.description_fmi3 import fmi3_description
+from fmus.ports.description import fmi2_description, fmi3_description
 from fmus.ports.fields import declared
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import Misdeclared, Port
