@@ -110,12 +110,8 @@ def component_page(source: Source) -> str:
 def page_of(model: Model, head: Sequence[str], fmi: str = "2", more: Sequence[str] = ()) -> str:
     """Write the page of a model in Markdown for its FMU.
 
-    Args:
-        model: the model.
-        head: texts at the beginning; the ports come before the second heading of the first one.
-        fmi: version of FMI.
-        more: texts before the example.
-
+    The ports come before the second heading of the first text in `head`, and `more` before the
+    example.
     """
     refusals = _REFUSALS
     if fmi == "3":

@@ -75,9 +75,6 @@ def _defined(node: ast.stmt) -> Iterator[str]:
 def source_of_script(path: Path) -> Source:
     """Return the source of a component, and let its modules be imported from now on.
 
-    Args:
-        path: a script from :func:`script_in`.
-
     Raises:
         ValueError: its name cannot be the name of a module.
 
@@ -203,13 +200,7 @@ def _is_data(path: Path, root: Path) -> bool:
 
 
 def message_of(error: BaseException, path: Path) -> str:
-    """Return the message of an error in a component, on one line with its file and line.
-
-    Args:
-        error: error of an import, a declaration, a translation or a compiler.
-        path: path of the script as the user gave it.
-
-    """
+    """Return the message of an error in a component, on one line with its file and line."""
     text, frames, root = str(error), _frames(error, path), path.resolve().parent
     is_ours = isinstance(error, (OSError, TypeError, ValueError)) or _is_our_own(error)
     place, message = str(path), text if is_ours else f"{type(error).__name__}: {text}"

@@ -33,15 +33,7 @@ from fmus.language.types import (
 def binary(
     functions: Functions, operator: ast.operator, left: Expression, right: Expression
 ) -> Expression | None:
-    """Return a sum, a difference, a product or a quotient; None if it is undefined in Python, too.
-
-    Args:
-        functions: functions of the program, to which one is added.
-        operator: the operator.
-        left: first operand.
-        right: second operand; numbers must be floats.
-
-    """
+    """Return a sum, a difference, a product or a quotient; None if Python defines none."""
     one, other = left.type, right.type
     if isinstance(operator, (ast.Add, ast.Sub)) and one == other and is_algebraic(one):
         name, sign = (

@@ -435,16 +435,7 @@ class _Builder:
         made: Function,
         node: ast.FunctionDef | None = None,
     ) -> None:
-        """Begin an empty tree.
-
-        Args:
-            program: program of the function.
-            path: path of its module.
-            scope: globals of its module.
-            made: the function.
-            node: its definition; None for a function of an expression.
-
-        """
+        """Begin an empty tree."""
         self.made, self.program, self.path, self.scope = made, program, path, scope
         self.node = node
         self.names: set[str] = set()
@@ -1066,13 +1057,7 @@ class _Builder:
     # Loops
 
     def _loop(self, node: ast.For | ast.comprehension, hold: _Hold) -> _Loop:
-        """Return the head of a loop.
-
-        Args:
-            node: the loop.
-            hold: returns a value for use in each turn.
-
-        """
+        """Return the head of a loop."""
         counter = Local("", INT)
         called, call = self._called(node.iter)
         if not call or called is not range:

@@ -109,15 +109,7 @@ def fmu_entries(
     report: Callable[[str], None],
     arrays: bool = False,
 ) -> dict[str, bytes]:
-    """Return the contents of the FMU of a component.
-
-    Args:
-        source: source of the component.
-        fmi: version of FMI.
-        platforms: platforms of its libraries.
-        compiler: compiler for the libraries.
-        report: called with a line when a library was compiled.
-        arrays: True to make vectors and matrices of one unit array variables of FMI 3.0.
+    """Return the contents of the FMU of a component; `report` gets a line for each library.
 
     Raises:
         OSError: the compiler fails.
@@ -146,16 +138,9 @@ def entries_of(
     compiler: Compiler,
     report: Callable[[str], None],
 ) -> dict[str, bytes]:
-    """Return the contents of an FMU.
+    """Return the contents of an FMU; `report` gets a line for each library.
 
     Its GUID follows from its description and its sources, and is the same for all platforms.
-
-    Args:
-        parts: parts of the FMU.
-        fmi: version of FMI.
-        platforms: platforms of its libraries.
-        compiler: compiler for the libraries.
-        report: called with a line when a library was compiled.
 
     Raises:
         OSError: the compiler fails.

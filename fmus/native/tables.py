@@ -55,15 +55,7 @@ def places_of(definition: Definition, owner: str) -> dict[str, str]:
 def port_tables(
     ports: Sequence[Port], parameters: Mapping[str, str], state: Iterable[Any], arrays: bool = False
 ) -> str:
-    """Write the file ports.h.
-
-    Args:
-        ports: all ports but `fault`.
-        parameters: places of parameters, by their names.
-        state: types of the state's numbers, in Python.
-        arrays: True to join the ports of an array into one variable.
-
-    """
+    """Write the file ports.h for all ports but `fault`; `state` are the types of its numbers."""
     values = {
         causality: reals_first([port for port in ports if port.causality == causality])
         for causality in ("input", "output")

@@ -93,10 +93,6 @@ class Definition(Model):
 def define(name: str, module: ModuleType) -> Definition:
     """Return the definition of a component.
 
-    Args:
-        name: name of the component.
-        module: its module.
-
     Raises:
         Misdeclared: it is not a component.
 

@@ -203,13 +203,7 @@ _CAPABILITIES_2 = {
 
 
 def fmi2_description(model: Model, guid: str) -> bytes:
-    """Write the description of a model; its library is named after its identifier.
-
-    Args:
-        model: the model.
-        guid: the GUID that is compiled into the library.
-
-    """
+    """Write the description of a model whose library contains the GUID."""
     root = _root("2.0", model, guid=guid)
     implementation = SubElement(root, "CoSimulation", modelIdentifier=model.identifier)
     SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCES["2"])
@@ -278,13 +272,9 @@ _PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin"
 
 
 def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
-    """Write the description of a model; its library is named after its identifier.
+    """Write the description of a model whose library contains the token.
 
-    Args:
-        model: the model.
-        token: the instantiation token that is compiled into the library.
-        arrays: True to make vectors and matrices of one unit array variables.
-
+    With `arrays`, vectors and matrices of one unit are array variables.
     """
     ports = (*model.ports, FAULT, TIME)
     variables = variables_of(ports, arrays)
@@ -330,13 +320,7 @@ class _Variable(NamedTuple):
 
 
 def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]:
-    """Return ports as variables.
-
-    Args:
-        ports: ports in the order of their value references.
-        arrays: True to join the ports of an array into one variable.
-
-    """
+    """Return ports as variables; with `arrays`, the ports of an array are one variable."""
     if not arrays:
         ports = [replace(port, array=None) for port in ports]
     names = {port.name: port.array.name if port.array else port.name for port in ports}

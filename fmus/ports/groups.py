@@ -139,11 +139,6 @@ def word(hint: Any) -> str:
 def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
     """Refuse a type that is not in the language of equations, or has such a part.
 
-    Args:
-        hint: the type.
-        place: names of its class and field.
-        around: classes that contain it.
-
     Raises:
         Misdeclared: it is not in the language.
 
@@ -198,13 +193,7 @@ def reals_first(ports: Sequence[Port]) -> list[Port]:
 
 
 def unpacking(made: type[T], ports: Sequence[Port]) -> Callable[[Sequence[Value]], T]:
-    """Compile a function that makes groups from the values of ports, Reals first.
-
-    Args:
-        made: NamedTuple with the groups, in the order of the ports.
-        ports: ports with one value each.
-
-    """
+    """Compile a function that makes a NamedTuple of groups from values of ports, Reals first."""
     if not ports:
         nothing = made()
         return lambda values: nothing
@@ -235,14 +224,9 @@ def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
 
 
 def packed(given: Any, groups: Mapping[str, str]) -> str:
-    """Return the expression of a list of the values of ports, Reals first, from groups.
+    """Return the expression of a list of values of ports, Reals first, from groups.
 
     Its evaluation raises OverflowError for an integer of more than 32 bits.
-
-    Args:
-        given: NamedTuple with the groups, in the order of the ports.
-        groups: expressions of its fields.
-
     """
     hints = hints_of(given)
     texts = [pair for name, text in groups.items() for pair in scattered(hints[name], text)]

@@ -38,23 +38,12 @@ _PICTURE = "terminal"
 
 
 def terminals_and_icons(ports: Sequence[Port], arrays: bool = False) -> bytes:
-    """Write terminalsAndIcons.xml of a component.
-
-    Args:
-        ports: all ports but `fault`, which no component takes.
-        arrays: True to join the ports of an array into one variable.
-
-    """
+    """Write terminalsAndIcons.xml of a component, for all ports but `fault`."""
     return terminals_of({"": [variable.port for variable in variables_of(ports, arrays)]})
 
 
 def terminals_of(parts: Mapping[str, Sequence[Port]]) -> bytes:
-    """Write terminalsAndIcons.xml of a model with several parts.
-
-    Args:
-        parts: ports of the parts, by the prefix of the names of their variables and terminals.
-
-    """
+    """Write terminalsAndIcons.xml of a model with several parts, by the prefix of their names."""
     root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     graphics = SubElement(root, "GraphicalRepresentation")
     SubElement(graphics, "CoordinateSystem", _ICON, suggestedScalingFactorTo_mm=_SCALE)

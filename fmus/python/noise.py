@@ -28,13 +28,7 @@ class Noise:
     """
 
     def __init__(self, generator: Random, count: int) -> None:
-        """Continue a generator.
-
-        Args:
-            generator: Python's generator.
-            count: number of random numbers in a draw.
-
-        """
+        """Continue one of Python's generators, with draws of `count` numbers."""
         self._generator, self._count = generator, count
         self._means, self._deviations = (0.0,) * count, (1.0,) * count
         self._note()

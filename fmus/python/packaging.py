@@ -166,11 +166,6 @@ def seal(entries: dict[str, bytes], destination: Path) -> None:
     of two FMUs with a module of the same name, the second silently runs the first one's code.
     Sealing adds a hash of the FMU's contents to the name of every top-level module in `resources`,
     and gives the FMU a GUID made from the same hash.
-
-    Args:
-        entries: contents of the FMU, by their paths.
-        destination: file to write.
-
     """
     entries = dict(entries)
     description = _TIME.sub(b"", entries[_DESCRIPTION], count=1)

@@ -49,10 +49,6 @@ from fmus.python.state import measuring
 def slave_of(name: str, module: ModuleType) -> type[Component]:
     """Return the class of a component; it is cached, since each instance of an FMU asks for it.
 
-    Args:
-        name: name of the component.
-        module: its module.
-
     Raises:
         Misdeclared: it is not a component.
 

@@ -205,11 +205,7 @@ def _member(value: int, kind: type[IntEnum]) -> IntEnum:
 
 
 def restored(hint: Any, value: Any) -> Any:
-    """Restore a state, or a part of one, from memory or JSON.
-
-    Args:
-        hint: its type.
-        value: the state or part, possibly with lists in place of tuples.
+    """Restore a state, or a part of one, from memory, or from JSON, which has lists for tuples.
 
     Raises:
         Refusal: it has another type or length, is not finite, has more than 32 bits, or is not a
@@ -302,12 +298,6 @@ def checked(
     saved: Mapping[str, Any], identity: str, store: Store, said: Behaviour
 ) -> dict[str, Any]:
     """Return a copy of a saved state, if it is a possible state of a component.
-
-    Args:
-        saved: the state, from memory or from bytes.
-        identity: class and version of the component.
-        store: values of an instance of it.
-        said: its hooks and constants.
 
     Raises:
         Refusal: it belongs to another component or version, or no run can have led to it.

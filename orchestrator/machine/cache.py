@@ -221,13 +221,7 @@ def _open_to_others(path: Path, n_within: int) -> Path | None:
 
 
 def _keeps_others_out(status: os.stat_result, above: bool) -> bool:
-    """Return True if only the user can change the contents of a folder.
-
-    Args:
-        status: status of the folder.
-        above: True for a folder above the cache folder.
-
-    """
+    """Return True if only the user can change a folder, which may be above the cache folder."""
     mine = is_mine(status, or_roots=above)
     open_to_others = others_write(status) and not (above and status.st_mode & S_ISVTX)
     # A file in place of a folder is reported when something is written into it.

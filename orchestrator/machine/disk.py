@@ -89,10 +89,7 @@ def sha256_of(path: Path) -> str:
 def file_name(name: str, taken: Collection[str] = ()) -> str:
     """Return a file name that every system accepts, and that no other name is turned into.
 
-    Args:
-        name: any text.
-        taken: names of other files in the same folder.
-
+    It differs from the names that are taken in the same folder.
     """
     plain = _ODD.sub("_", name).strip(" ").rstrip(".")
     plain = plain.encode()[:_LONGEST].decode(errors="ignore")
@@ -110,11 +107,6 @@ def plain_file_names(names: Iterable[str], *taken: str) -> list[str]:
     """Return file names that need no encoding in a URI: some hosts do not decode URIs.
 
     No two are equal or differ in case only, since some file systems ignore case.
-
-    Args:
-        names: any texts.
-        taken: names that are not free.
-
     """
     found: list[str] = []
     used = {name.lower() for name in taken}
@@ -131,10 +123,7 @@ def plain_file_names(names: Iterable[str], *taken: str) -> list[str]:
 def write_whole(path: Path, text: str, partial: Path) -> None:
     """Write a text file atomically: after a crash it holds the old text or the new one.
 
-    Args:
-        path: path of the file.
-        text: its new content.
-        partial: path of the unfinished file, in the same folder, that nothing else uses.
+    The unfinished file `partial` is in the same folder, and nothing else uses its name.
 
     Raises:
         OSError: it cannot be written.
@@ -169,11 +158,7 @@ def move_aside(path: Path) -> Path:
 
 @contextmanager
 def hold_lock(folder: Path, wait: bool = False) -> Iterator[None]:
-    """Keep other processes out of a folder.
-
-    Args:
-        folder: an existing folder.
-        wait: if set, wait until no other process is in it.
+    """Keep other processes out of an existing folder; with `wait`, wait until none is in it.
 
     Raises:
         BlockingIOError: another process is in it.

@@ -60,13 +60,7 @@ def listed(names: Sequence[str], between: str = ", ") -> str:
 
 
 def escape_unprintable(text: str, allowed: str = "") -> str:
-    """Escape control characters, which a terminal would interpret.
-
-    Args:
-        text: the text to show.
-        allowed: unprintable letters that are kept.
-
-    """
+    """Escape control characters, which a terminal would interpret, except the allowed ones."""
     return "".join(
         letter if letter.isprintable() or letter in allowed else repr(letter)[1:-1]
         for letter in text

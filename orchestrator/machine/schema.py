@@ -48,11 +48,7 @@ class TomlTable(BaseModel):
 
     @classmethod
     def check(cls, where: object, content: Mapping[str, Any]) -> None:
-        """Check that a table conforms to this schema.
-
-        Args:
-            where: place of the table, for messages.
-            content: its content.
+        """Check that a table conforms to this schema; messages begin with its place.
 
         Raises:
             Refused: it does not; with all problems.

@@ -26,11 +26,7 @@ def integer(text: str) -> int:
 
 
 def finite(text: str, where: str) -> float:
-    """Read a finite number from a file.
-
-    Args:
-        text: text of the number.
-        where: its place, for the message.
+    """Read a finite number from a file; `where` is its place for the message.
 
     Raises:
         ValueError: it is not a finite number.
@@ -47,10 +43,6 @@ def finite(text: str, where: str) -> float:
 
 def whole(text: str, where: str) -> int:
     """Read an integer from a file, which other tools may have written with a decimal point.
-
-    Args:
-        text: text of the number.
-        where: its place, for the message.
 
     Raises:
         ValueError: it is not an integer.

@@ -109,11 +109,7 @@ def check_file(path: Path) -> None:
 
 
 def read_text(path: Path, what: str) -> str:
-    """Read a short file as text.
-
-    Args:
-        path: path of the file.
-        what: description of a file that is not text, for the message.
+    """Read a short file as text; `what` describes a file that is not text, for the message.
 
     Raises:
         InputError: there is no such file, it is too long, or it is not UTF-8.

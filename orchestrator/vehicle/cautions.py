@@ -186,15 +186,7 @@ class Watch:
 def cautions_seen(
     seen: Mapping[str, float], loop: Loop, value: ValueOf, step: float
 ) -> Iterator[Caution]:
-    """Yield the warnings about a loop that follow from a run.
-
-    Args:
-        seen: results of :data:`WATCHED` by their names; some may be missing.
-        loop: the loop.
-        value: returns the values of parameters.
-        step: step of the run [s].
-
-    """
+    """Yield the warnings that follow from the results of :data:`WATCHED` for a loop."""
     rho_hat, vertical = seen.get("largest_bound", -inf), seen.get("vertical_passed", inf)
     roll, eps = f"{loop.vehicle}.roll", f"{loop.controller}.eps_t"
     needed = (eps, loop.ell, f"{loop.controller}.h_max", *loop.vehicle_parameters)
@@ -223,15 +215,7 @@ def cautions_seen(
 def cautions_beside(
     table: Table, name: str, other: Table, loops: Sequence[Loop] = (STANDARD,)
 ) -> list[str]:
-    """Return lines for the user about references that differ between two runs.
-
-    Args:
-        table: table of the run.
-        name: name of the run to compare with.
-        other: table of that run.
-        loops: loops of both runs.
-
-    """
+    """Return lines for the user if references differ between a run and another one of some name."""
     return [line for loop in loops for line in _differing_reference(table, name, other, loop)]
 
 

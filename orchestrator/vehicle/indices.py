@@ -147,12 +147,9 @@ def metrics() -> tuple[Index, ...]:
 def index_columns(
     loops: Sequence[Loop] = (STANDARD,), own: Sequence[Index] = ()
 ) -> tuple[str, ...]:
-    """Return the columns of all indices in a study, with prefixes if there are several vehicles.
+    """Return the columns of all indices in a study, the user's own last.
 
-    Args:
-        loops: loops of the vehicles.
-        own: the user's indices, which come last.
-
+    With several vehicles, they begin with the vehicle's name.
     """
     of_each = (
         f"{prefix}{column}"
@@ -210,12 +207,7 @@ def smallest_distances(table: Table, loops: Sequence[Loop]) -> np.ndarray:
 
 
 def smallest_of(positions: np.ndarray) -> np.ndarray:
-    """Return the smallest distance of each row [m].
-
-    Args:
-        positions: positions of the vehicles, (rows, vehicles, 3) [m].
-
-    """
+    """Return the smallest distance of each row [m], for positions (rows, vehicles, 3) [m]."""
     rows = max(1, _AT_ONCE // positions.shape[1])
     blocks = np.split(positions, range(rows, len(positions), rows))
     return np.concatenate([_smallest(block) for block in blocks])
@@ -243,14 +235,7 @@ class Indices:
         chosen: Sequence[Index] | None = None,
         own: Sequence[Index] = (),
     ) -> None:
-        """Choose the indices.
-
-        Args:
-            loops: loops of the vehicles.
-            chosen: indices out of :data:`INDICES`; None: all.
-            own: the user's indices.
-
-        """
+        """Choose among :data:`INDICES`, by default all, and add the user's own."""
         self._loops, self._chosen = loops, (*(INDICES if chosen is None else chosen), *own)
 
     def begin(self, header: Header) -> None:
@@ -314,13 +299,7 @@ class Metrics(Indices):
         super().__init__(loops, metrics())
 
     def content(self, scenario: str, system: System) -> dict[str, Any]:
-        """Return the content of metrics.json; indices of several vehicles are under their names.
-
-        Args:
-            scenario: name of the scenario.
-            system: the system that was run.
-
-        """
+        """Return the content of metrics.json; indices of several vehicles are under their names."""
         experiment = self._header.experiment
         content: dict[str, Any] = {
             "scenario": scenario,

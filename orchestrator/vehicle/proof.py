@@ -235,14 +235,7 @@ class CertificatesFile:
     """An observer that writes the certificates as CSV, if the run has the columns for them."""
 
     def __init__(self, path: Path, interval: float | None = None, loop: Loop = STANDARD) -> None:
-        """Choose the file, which is created when the first row is written.
-
-        Args:
-            path: path of the file.
-            interval: interval at which an instant is written [s]; None: all instants.
-            loop: the loop.
-
-        """
+        """Choose the file, which is created when the first row is written, and an interval [s]."""
         self._path, self._loop = path, loop
         self._interval = interval
         self._lines: CsvLines | None = None

@@ -208,16 +208,7 @@ class _Compiled:
         constants: Mapping[str, Value],
         run: Experiment,
     ) -> None:
-        """Start without rows.
-
-        Args:
-            library: its library.
-            reducer: the reducer.
-            places: columns of the inputs that change, by the names of their ports.
-            constants: values of the other inputs.
-            run: times of the run.
-
-        """
+        """Start without rows."""
         self._library, self._reducer, self._run = library, reducer, run
         self._memory = create_string_buffer(library.size_of_rows())
         names = [port.name for port in reducer.ports]
