@@ -7,7 +7,6 @@ the bundle is written only if its sources have changed; a user's FMU is always w
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -36,6 +35,7 @@ from fmus.script import (
     source_of_script,
 )
 from orchestrator.machine.compilers import compiler_for, platforms
+from orchestrator.machine.disk import sha256_of
 
 #: Exit status if the user's script cannot be built; other errors give 2.
 FAILED = 1
@@ -61,12 +61,12 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> None:
         path: source_of(component)
         for component in components()
         if not (path := destination / f"{component}.fmu").is_file()
-        or digests.get(path.name) != _digest(path)
+        or digests.get(path.name) != sha256_of(path)
     }
     with ThreadPoolExecutor(kind.side_by_side) as pool:
         list(pool.map(lambda path: kind.write(stale[path], path), stale))
     if stale:
-        digests |= {path.name: _digest(path) for path in stale}
+        digests |= {path.name: sha256_of(path) for path in stale}
         text = json.dumps({**made_from, "sha256": digests})
         manifest.write_text(text + "\n", encoding="utf-8")
 
@@ -85,10 +85,6 @@ def built_before(manifest: Path) -> dict[str, Any]:
 def _report(line: str) -> None:
     """Print a line at once and in one piece, since several threads print."""
     print(f"{line}\n", end="", flush=True)
-
-
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
 def chosen_loader(destination: Path, wanted: str | None) -> str:

@@ -10,7 +10,6 @@ import zipfile
 from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import distribution
-from importlib.util import find_spec
 from inspect import cleandoc
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +17,7 @@ from xml.etree import ElementTree
 
 from fmus.kinds import CONTAINED
 from fmus.ports.definition import Definition, define
+from orchestrator.machine.identity import package_folder
 
 #: The folder of a component that holds its reference results.
 REFERENCE = "reference"
@@ -28,14 +28,6 @@ RELATED_MANIFEST = "fmi-ls-manifest.xml"
 
 #: The oldest time in a zip archive, used for all entries so that builds are reproducible.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
-
-
-def package_folder(package: str) -> Path:
-    """Return the folder of an installed package; only its parent packages are imported."""
-    specification = find_spec(package)
-    assert specification is not None and specification.submodule_search_locations
-    [folder] = specification.submodule_search_locations
-    return Path(folder)
 
 
 def lies_in(folder: Path, file: Path, module: str) -> bool:

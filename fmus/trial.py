@@ -22,6 +22,7 @@ from typing import Any, Union
 
 from auv_fmu.language.quantities import group_name
 from fmus.discovery import name_of
+from fmus.ports.groups import flat
 from fmus.ports.port import Port
 from fmus.python.slave import slave_of
 
@@ -98,7 +99,7 @@ def _set(slave: Any, causality: str, values: Mapping[str, Any]) -> None:
         if not found:
             names = ", ".join(port.name for _, port in known) or "none"
             raise ValueError(f"no {causality} {name!r}; there are: {names}")
-        given = [value] if found[0][1].name == name else _flat(value)
+        given = [value] if found[0][1].name == name else [*flat(value)]
         if len(given) != len(found):
             raise ValueError(f"{name}: {len(given)} values for {len(found)} ports")
         for (reference, port), one in zip(found, given):
@@ -125,9 +126,3 @@ def _converted(port: Port, value: Any) -> Any:
     if port.type == "Enumeration":
         value = port.choices.get(value, value)
     return int(value) if isinstance(value, IntEnum) else value
-
-
-def _flat(value: Any) -> list[Any]:
-    """Return the numbers of a vector or a matrix, row by row."""
-    is_group = isinstance(value, (tuple, list))
-    return [x for part in value for x in _flat(part)] if is_group else [value]

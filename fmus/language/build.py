@@ -512,7 +512,7 @@ class _Builder:
             raise _Outside(node, f"* among the arguments of {node.name}: name them")
         for argument in _arguments(node):
             if argument.arg == "_":
-                raise _Outside(argument, self._foreign("an argument _"))
+                raise self._cannot(argument, "an argument _")
             if argument.annotation is None:
                 raise _Outside(argument, f"the argument {argument.arg} of {node.name} has no type")
         if node.returns is None:
@@ -534,11 +534,8 @@ class _Builder:
 
     # Mistakes
 
-    def _foreign(self, what: str) -> str:
-        return f"{what} is not in the language of equations{advice(what)}"
-
     def _cannot(self, node: ast.AST, what: str) -> _Outside:
-        return _Outside(node, self._foreign(what))
+        return _Outside(node, f"{what} is not in the language of equations{advice(what)}")
 
     # Blocks
 
@@ -677,7 +674,7 @@ class _Builder:
 
     def _while_statement(self, node: ast.While, found: list[Statement]) -> None:
         if node.orelse:
-            raise _Outside(node.orelse[0], self._foreign("else of a while"))
+            raise self._cannot(node.orelse[0], "else of a while")
         is_endless = isinstance(node.test, ast.Constant) and node.test.value == 1
         inside = [n for statement in node.body for n in ast.walk(statement)]
         if is_endless:
@@ -698,7 +695,7 @@ class _Builder:
 
     def _for_statement(self, node: ast.For, found: list[Statement]) -> None:
         if node.orelse:
-            raise _Outside(node.orelse[0], self._foreign("else of a for"))
+            raise self._cannot(node.orelse[0], "else of a for")
         self._check_target(node.target)
         changed = {*_stored(*node.body), *_names(node.target)}
         first = _first_name(node.target)
@@ -781,7 +778,8 @@ class _Builder:
     def _captured(self, node: ast.AST, names: Sequence[str], own: Set[str]) -> list[str]:
         """Return the variables that a nested function uses, also in functions that it calls."""
         self._check_functions(names)
-        used = [n for name in names for n in (name, *self._captured_by(name))]
+        captured = {name: called.captured for name, called in self.functions.items()}
+        used = [n for name in names for n in (name, *captured.get(name, ()))]
         found = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
         for name in found:
             if name in own:
@@ -796,9 +794,6 @@ class _Builder:
 
     def _is_known(self, name: str) -> bool:
         return self.known is None or name in self.known
-
-    def _captured_by(self, name: str) -> Sequence[str]:
-        return self.functions[name].captured if name in self.functions else ()
 
     def _inner(self, word: str, own: set[str], node: ast.FunctionDef | None = None) -> _Builder:
         """Return the builder of a nested function."""
@@ -1319,10 +1314,10 @@ class _Builder:
         name = node.id if isinstance(node, ast.Name) else ast.unparse(node).rsplit(".")[-1]
         value = self._global_value(node)
         if value is None:
-            shown = ast.unparse(node)
-            known = advice(f"the name {shown}")
-            raise _Outside(node, self._foreign(f"the name {shown}") if known else
-                           f"the name {shown} is not known here")  # fmt: skip
+            what = f"the name {ast.unparse(node)}"
+            if advice(what):
+                raise self._cannot(node, what)
+            raise _Outside(node, f"{what} is not known here")
         if isinstance(value, ModuleType):
             what = f"the module {value.__name__}"
             raise _Outside(node, f"{what} is not a value: name a part of it")

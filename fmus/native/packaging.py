@@ -22,8 +22,9 @@ from fmus.ports.description import (
     fmi2_description,
     fmi3_build_description,
     fmi3_description,
+    variables_of,
 )
-from fmus.ports.terminals import terminals_and_icons
+from fmus.ports.terminals import terminals_of
 from orchestrator.machine.compilers import Compiler, Platform, library
 
 _FOLDER = Path(__file__).parent
@@ -38,12 +39,6 @@ _IDENTITY = """\
 
 #endif
 """
-
-
-def _described(model: Model, guid: str, fmi: str, arrays: bool) -> bytes:
-    if fmi == FMI_VERSIONS[0]:
-        return fmi2_description(model, guid)
-    return fmi3_description(model, guid, arrays)
 
 
 class Parts(NamedTuple):
@@ -125,7 +120,7 @@ def fmu_entries(
         translated(definition),
         tables(definition, arrays),
         documents,
-        terminals_and_icons(definition.ports, arrays),
+        terminals_of({"": [one.port for one in variables_of(definition.ports, arrays)]}),
         arrays,
     )
     return entries_of(parts, fmi, platforms, compiler, report)
@@ -147,10 +142,12 @@ def entries_of(
 
     """
     model, name = parts.model, parts.model.identifier
-    describe = partial(_described, model, fmi=fmi, arrays=parts.arrays)
+    describe = partial(fmi3_description, arrays=parts.arrays)
+    if fmi == FMI_VERSIONS[0]:
+        describe = fmi2_description
     texts = sources_of(parts.equations, parts.tables, fmi)
     written = {name: text.encode() for name, text in texts.items()}
-    guid = guid_of(digest_of({**written, "modelDescription.xml": describe("")}))
+    guid = guid_of(digest_of({**written, "modelDescription.xml": describe(model, "")}))
     written["identity.h"] = _IDENTITY.format(name=quoted(model.name), guid=guid).encode()
     libraries = {}
     for platform in platforms:
@@ -158,7 +155,7 @@ def entries_of(
         libraries[path] = library(compiler, platform, name, written, SOURCES[fmi])
         report(f"{model.name} for {platform.name}, FMI {fmi}.0")
     return {
-        "modelDescription.xml": describe(guid),
+        "modelDescription.xml": describe(model, guid),
         **_pictures(parts, fmi),
         **parts.documents,
         "documentation/licenses/license.txt": licences(NATIVE).encode(),

@@ -108,6 +108,15 @@ def scalars_of(hint: Any) -> Iterator[Any]:
         yield from scalars_of(part)
 
 
+def flat(value: Any) -> Iterator[Any]:
+    """Yield the numbers in nested tuples or lists, in order."""
+    if isinstance(value, (tuple, list)):
+        for part in value:
+            yield from flat(part)
+    else:
+        yield value
+
+
 def is_whole(hint: Any) -> bool:
     """Return True for an integer or an enumeration."""
     return hint is int or is_class(hint, IntEnum)
@@ -281,15 +290,9 @@ class ParameterSet(Generic[T]):
     """Ports of a parameter set of the equations, one for each number in it."""
 
     def __init__(self, made: type[T], ports: Sequence[Port]) -> None:
-        """Declare the set.
-
-        Args:
-            made: NamedTuple of the equations.
-            ports: a port for each number in it.
-
-        """
-        self._made = made
-        self.ports = tuple(ports)
+        """Declare the set, a NamedTuple of the equations, with a port for each number in it."""
+        self._made, self.ports = made, tuple(ports)
+        self._unpack = unpacking(made, self.ports)
 
     @property
     def paths(self) -> dict[str, tuple[str | int, ...]]:
@@ -298,18 +301,7 @@ class ParameterSet(Generic[T]):
 
     def of(self, values: Mapping[str, Value]) -> T:
         """Make the parameter set from the values of its ports, by name."""
-        made: T = filled(self._made, iter([port.meaning(values[port.name]) for port in self.ports]))
-        return made
-
-
-def filled(hint: Any, values: Iterator[Any]) -> Any:
-    """Make a value of a type from its numbers."""
-    parts = parts_of(hint)
-    if parts is None:
-        return next(values)
-    elements = tuple(filled(part, values) for part in parts)
-    made = class_of(hint)
-    return tuple.__new__(made, elements) if is_class(made, tuple) else elements
+        return self._unpack([values[port.name] for port in reals_first(self.ports)])
 
 
 def _places(hint: Any) -> Iterator[tuple[str | int, ...]]:

@@ -140,10 +140,6 @@ class Port:
             known = ", ".join(f"{number:d} ({name})" for name, number in self.choices.items())
             raise Refusal(f"{self.name} = {value}: use one of {known}")
 
-    def meaning(self, value: Value) -> Value:
-        """Return the value that equations receive: for a choice, the member of the enumeration."""
-        return next((one for one in self.choices.values() if one == value), value)
-
 
 def is_line(text: object) -> bool:
     """Return True for a line of text that XML can contain."""

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from auv_fmu.language.quantities import member_of
-from fmus.ports.description import document, variables_of
+from fmus.ports.description import document
 from fmus.ports.groups import slices
 from fmus.ports.port import Port
 
@@ -35,11 +35,6 @@ _COLOUR = "0 0 127"
 
 #: The picture of a terminal, in the folder of the file, without the suffix .png.
 _PICTURE = "terminal"
-
-
-def terminals_and_icons(ports: Sequence[Port], arrays: bool = False) -> bytes:
-    """Write terminalsAndIcons.xml of a component, for all ports but `fault`."""
-    return terminals_of({"": [variable.port for variable in variables_of(ports, arrays)]})
 
 
 def terminals_of(parts: Mapping[str, Sequence[Port]]) -> bytes:

@@ -20,13 +20,13 @@ from fmus.discovery import (
     digest_of,
     guid_of,
     licences,
-    package_folder,
     write_archive,
 )
 from fmus.kinds import PYTHON
 from fmus.python.modules import modules_of, with_other_imports
 from fmus.script import data_files, import_from, no_component
 from orchestrator.machine.compilers import Compiler, compile_library, own_compiler
+from orchestrator.machine.identity import package_folder
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 

@@ -26,15 +26,21 @@ def digest_of(*identities: Identity) -> str:
     return sha256(json.dumps(identities, sort_keys=True).encode()).hexdigest()
 
 
+def package_folder(package: str) -> Path:
+    """Return the folder of an installed package; only its parent packages are imported."""
+    specification = find_spec(package)
+    assert specification is not None and specification.submodule_search_locations
+    [folder] = specification.submodule_search_locations
+    return Path(folder)
+
+
 @cache
 def code_of(*packages: str) -> str:
     """Return a digest of the Python and C sources of packages."""
     digest = sha256()
     for package in packages:
-        specification = find_spec(package)
-        assert specification is not None and specification.submodule_search_locations
-        [root] = specification.submodule_search_locations
-        found = (path for path in Path(root).rglob("*") if path.suffix in (".c", ".h", ".py"))
+        root = package_folder(package)
+        found = (path for path in root.rglob("*") if path.suffix in (".c", ".h", ".py"))
         for path in sorted(found):
             digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode())
             digest.update(path.read_bytes())

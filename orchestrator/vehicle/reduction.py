@@ -8,7 +8,7 @@ Both give the same numbers, the compiled one far sooner.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from ctypes import CDLL, c_char_p, c_double, c_int, c_size_t, c_void_p, create_string_buffer
 from functools import cache, partial
 from itertools import chain, product
@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmus.native.names import RUNTIME
-from fmus.ports.groups import SCOPE, compiled, gathered
+from fmus.ports.groups import SCOPE, compiled, flat, gathered
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer
 from orchestrator.cosim import Experiment, Header, Value
@@ -194,7 +194,7 @@ class _Interpreted:
             Raised: a hook has raised an exception.
 
         """
-        return [*_flat(self._call("outputs", self._time))]
+        return [*map(float, flat(self._call("outputs", self._time)))]
 
 
 class _Compiled:
@@ -353,12 +353,3 @@ class Reduction:
         results = self._reducer.results.items()
         values = {name: [next(numbers) for _ in ports] for name, ports in results}
         return {name: found for name, found in values.items() if not all(map(isnan, found))}
-
-
-def _flat(value: Any) -> Iterator[float]:
-    """Yield the numbers in nested tuples."""
-    if not isinstance(value, tuple):
-        yield float(value)
-        return
-    for part in value:
-        yield from _flat(part)

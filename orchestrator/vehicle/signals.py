@@ -257,12 +257,12 @@ def applied(table: Table, loop: Loop = STANDARD) -> np.ndarray:
     Actuators with a lag have a state, so for them the value at the end of the step counts.
     """
     at_once = table.step_values(*loop.applied)
-    if not (late := with_lag(table, loop)).any():
+    if not (late := _with_lag(table, loop)).any():
         return at_once
     return np.where(late, table.group(*loop.applied)[1:], at_once)
 
 
-def with_lag(table: Table, loop: Loop) -> np.ndarray:
+def _with_lag(table: Table, loop: Loop) -> np.ndarray:
     """Return True for each actuator with a lag: all, if the vehicle has an allocation."""
     if isinstance(loop, AllocatedLoop):
         return np.ones(len(ACTUATORS), bool)

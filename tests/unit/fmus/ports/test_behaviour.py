@@ -10,10 +10,10 @@ from types import ModuleType
 
 import pytest
 
-from fmus.discovery import package_folder
 from fmus.ports.behaviour import HOOKS, _message, read_behaviour
 from fmus.ports.groups import Nothing
 from fmus.ports.port import Misdeclared
+from orchestrator.machine.identity import package_folder
 
 GOOD = """\
 from __future__ import annotations

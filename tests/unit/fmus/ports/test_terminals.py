@@ -5,7 +5,7 @@ from __future__ import annotations
 from xml.etree import ElementTree
 
 from fmus.ports.port import Port
-from fmus.ports.terminals import terminals_and_icons
+from fmus.ports.terminals import terminals_of
 
 REAL = ("continuous", "Real")
 GROUPS = (
@@ -19,7 +19,7 @@ GROUPS = (
 
 
 def terminals() -> list[ElementTree.Element]:
-    return [*ElementTree.fromstring(terminals_and_icons(GROUPS)).iterfind("Terminals/Terminal")]
+    return [*ElementTree.fromstring(terminals_of({"": GROUPS})).iterfind("Terminals/Terminal")]
 
 
 def test_groups_of_inputs_and_outputs_alone_are_terminals():
@@ -41,7 +41,7 @@ def test_groups_of_inputs_and_outputs_alone_are_terminals():
 
 
 def test_inputs_are_on_the_left_and_outputs_on_the_right_of_the_icon():
-    icon = ElementTree.fromstring(terminals_and_icons(GROUPS)).find("GraphicalRepresentation/Icon")
+    icon = ElementTree.fromstring(terminals_of({"": GROUPS})).find("GraphicalRepresentation/Icon")
     assert icon is not None
     corners = [
         {key: int(value) for key, value in picture.attrib.items() if key in icon.attrib}
