@@ -142,9 +142,9 @@ def entries_of(
 
     """
     model, name = parts.model, parts.model.identifier
-    describe = partial(fmi3_description, arrays=parts.arrays)
-    if fmi == FMI_VERSIONS[0]:
-        describe = fmi2_description
+    describe: Callable[[Model, str], bytes] = fmi2_description
+    if fmi == "3":
+        describe = partial(fmi3_description, arrays=parts.arrays)
     texts = sources_of(parts.equations, parts.tables, fmi)
     written = {name: text.encode() for name, text in texts.items()}
     guid = guid_of(digest_of({**written, "modelDescription.xml": describe(model, "")}))

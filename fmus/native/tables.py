@@ -40,9 +40,9 @@ _TYPES = {float: "REAL", int: "INTEGER", bool: "BOOLEAN"}
 
 def tables(definition: Definition, arrays: bool = False) -> str:
     """Write the file ports.h of a component."""
-    said = definition.behaviour
+    behaviour = definition.behaviour
     places = places_of(definition, "model") | {H_MAX: "PARAMETER_AT(h_max)"}
-    return port_tables(definition.ports, places, scalars_of(said.state), arrays)
+    return port_tables(definition.ports, places, scalars_of(behaviour.state), arrays)
 
 
 def places_of(definition: Definition, owner: str) -> dict[str, str]:

@@ -98,9 +98,15 @@ def translated(definition: Definition) -> str:
         Untranslatable: its text is outside the language of equations.
 
     """
-    said = definition.behaviour
-    program = Program(*filter(None, said.hooks.values()))
-    groups = (said.parameters, said.inputs, said.outputs, said.state, said.derived or Nothing)
+    behaviour = definition.behaviour
+    program = Program(*filter(None, behaviour.hooks.values()))
+    groups = (
+        behaviour.parameters,
+        behaviour.inputs,
+        behaviour.outputs,
+        behaviour.state,
+        behaviour.derived or Nothing,
+    )
     for group in groups:
         try:
             type_of(group)
@@ -115,21 +121,23 @@ def translated(definition: Definition) -> str:
             f"{_MOST_ON_STACK // _NUMBER}, since they are on a thread's stack"
         )
     emitter = Emitter(program.functions.values())
-    glue = _glue(emitter, program, said)
+    glue = _glue(emitter, program, behaviour)
     citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
     head = _HEAD.format(title=closed(definition.summary), citation=closed(citation))
     return "\n\n".join([head, emitter.text(), glue]) + "\n"
 
 
-def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
+def _glue(emitter: Emitter, program: Program, behaviour: Behaviour) -> str:
     """Write the functions `model_...`, which the runtime calls, also for missing hooks."""
-    functions = {name: program.function(hook) for name, hook in said.hooks.items() if hook}
+    functions = {name: program.function(hook) for name, hook in behaviour.hooks.items() if hook}
     passages = {
         what: _passage(emitter, what, type_of(hint))
         for what, hint in (
-            ("inputs", said.inputs), ("outputs", said.outputs), ("state", said.state),
+            ("inputs", behaviour.inputs),
+            ("outputs", behaviour.outputs),
+            ("state", behaviour.state),
         )
-    }  # fmt: skip
+    }
     given = {
         "parameters": "*parameters",
         "inputs": passages["inputs"].got("inputs"),
@@ -151,7 +159,7 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
         **{name: alone.get(name, []) for name in ("check", "check_state")},
         "start": put("state", "start"),
         "restart": put("state", "restarted"),
-        "derive": [f"*derived = {calls['derive']};"] if said.derived else [],
+        "derive": [f"*derived = {calls['derive']};"] if behaviour.derived else [],
         "evaluate": put("outputs", "outputs"),
         "update": put("state", "update"),
     }
@@ -160,9 +168,11 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
         bodies["seed"] = [f"return (unsigned int){calls['seed']};"]
     if "credible" in calls:
         bodies["credible"] = [f"return {calls['credible']};"]
-    if said.noisy:
-        bodies["measure"] = _measured(emitter, said, passages["outputs"], functions["measured"])
-    parts = [_constants(said), *defined(bodies)]
+    if behaviour.noisy:
+        bodies["measure"] = _measured(
+            emitter, behaviour, passages["outputs"], functions["measured"]
+        )
+    parts = [_constants(behaviour), *defined(bodies)]
     text = "\n\n".join(parts)
     # Compilers warn of static functions that are not called.
     moving = [
@@ -171,19 +181,19 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
         for name, one in zip((form.gather, form.scatter), form.functions)
         if re.search(rf"\b{name}\(", text)
     ]
-    head = ["/* The functions for the runtime. */", _types(emitter, said, passages), *moving]
+    head = ["/* The functions for the runtime. */", _types(emitter, behaviour, passages), *moving]
     return "\n\n".join([*head, text])
 
 
-def _constants(said: Behaviour) -> str:
+def _constants(behaviour: Behaviour) -> str:
     """Write the constants that follow from the hooks."""
     found = {
-        "DRAWS": said.draws,
-        "SAMPLED": said.is_sampled,
-        "HAS_GUARD": said.hooks["credible"] is not None,
-        **{name: said.takes(*question) for name, question in _TAKES.items()},
+        "DRAWS": behaviour.draws,
+        "SAMPLED": behaviour.is_sampled,
+        "HAS_GUARD": behaviour.hooks["credible"] is not None,
+        **{name: behaviour.takes(*question) for name, question in _TAKES.items()},
     }
-    return constants(found, _directives(said.restarted))
+    return constants(found, _directives(behaviour.restarted))
 
 
 def constants(found: Mapping[str, int], restarted: str = "") -> str:
@@ -206,29 +216,29 @@ def _directives(text: str) -> str:
     )
 
 
-def _types(emitter: Emitter, said: Behaviour, passages: dict[str, _Passage]) -> str:
+def _types(emitter: Emitter, behaviour: Behaviour, passages: dict[str, _Passage]) -> str:
     defined = {
-        "model_parameters": emitter.type(type_of(said.parameters)),
+        "model_parameters": emitter.type(type_of(behaviour.parameters)),
         **{f"model_{what}": passage.declaration for what, passage in passages.items()},
-        "model_derived": emitter.type(type_of(said.derived or Nothing)),
+        "model_derived": emitter.type(type_of(behaviour.derived or Nothing)),
     }
-    hints = {"INPUTS": said.inputs, "OUTPUTS": said.outputs, "STATE": said.state}
+    hints = {"INPUTS": behaviour.inputs, "OUTPUTS": behaviour.outputs, "STATE": behaviour.state}
     counts = [f"MODEL_{what} = {count(type_of(hint))}" for what, hint in hints.items()]
     types = "".join(f"typedef {text} {name};\n" for name, text in defined.items())
     return f"{types}\nenum {{ {', '.join(counts)} }};"
 
 
 def _measured(
-    emitter: Emitter, said: Behaviour, outputs: _Passage, function: Function
+    emitter: Emitter, behaviour: Behaviour, outputs: _Passage, function: Function
 ) -> list[str]:
     """Return the statements that add noise to a group of outputs."""
     type_ = function.arguments["n"]
-    n = initializer(type_, map("draws[{}]".format, range(said.draws)))
+    n = initializer(type_, map("draws[{}]".format, range(behaviour.draws)))
     if not isinstance(type_, Scalar):
         n = f"({emitter.type(type_)}){n}"
     where = "groups." if outputs.gather else "outputs->"
-    group = f"{where}{in_c(said.noisy)}"
-    given = {"parameters": "*parameters", "n": n, said.noisy: group}
+    group = f"{where}{in_c(behaviour.noisy)}"
+    given = {"parameters": "*parameters", "n": n, behaviour.noisy: group}
     change = f"{group} = {emitter.call(function, [given[name] for name in function.arguments])};"
     if not outputs.gather:
         return [change]

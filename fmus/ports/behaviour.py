@@ -124,7 +124,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         Misdeclared: it is not a component.
 
     """
-    where, said = module.__name__, vars(module)
+    where, names = module.__name__, vars(module)
     hooks = _hooks(module)
     hints = {name: types_of_hook(f"{where}.{name}", hook) for name, hook in hooks.items()}
     outputs = hints["outputs"]["return"]
@@ -151,7 +151,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
             raise Misdeclared(f"{where}.{takes[0]} takes {why}", takes[0], argument)
         check_type(hint, *takes[:1], argument)
     for cls, argument in _CLASSES.items():
-        if cls in said and argument not in types:
+        if cls in names and argument not in types:
             raise Misdeclared(f"{cls} is there, but no hook takes {argument}", cls)
     behaviour = Behaviour(
         {name: hooks.get(name) for name in HOOKS},
@@ -162,11 +162,11 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         types.get("derived"),
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
-        _message(where, said.get("RESTARTED", "")),
-        said.get("SAMPLED", False),
-        seconds_in(said, "H_MAX", None),
-        seconds_in(said, "STEP_SIZE", 0.02),
-        seconds_in(said, "STOP_TIME", 100.0),
+        _message(where, names.get("RESTARTED", "")),
+        names.get("SAMPLED", False),
+        seconds_in(names, "H_MAX", None),
+        seconds_in(names, "STEP_SIZE", 0.02),
+        seconds_in(names, "STOP_TIME", 100.0),
     )
     _check_constants(where, behaviour)
     return behaviour
@@ -182,9 +182,9 @@ def _check_constants(where: str, behaviour: Behaviour) -> None:
         raise Misdeclared(f"{where} has H_MAX, but no update", "outputs")
 
 
-def seconds_in(said: Mapping[str, Any], name: str, default: Any) -> Any:
+def seconds_in(names: Mapping[str, Any], name: str, default: Any) -> Any:
     """Read a constant that is a time, as a float."""
-    found = said.get(name, default)
+    found = names.get(name, default)
     is_number = isinstance(found, (float, int)) and not isinstance(found, bool)
     if found is not default and not (is_number and isfinite(found) and found > 0):
         raise Misdeclared(f"{name} is {found!r:.40}; write seconds, more than 0")
@@ -193,19 +193,19 @@ def seconds_in(said: Mapping[str, Any], name: str, default: Any) -> Any:
 
 def _hooks(module: ModuleType) -> dict[str, FunctionType]:
     """Return the hooks of a component; refuse an incomplete set, and misspelt names."""
-    where, said = module.__name__, vars(module)
-    if "outputs" not in said:
+    where, names = module.__name__, vars(module)
+    if "outputs" not in names:
         raise Misdeclared(f"{where} has no function outputs")
     for together in _TOGETHER:
-        there = [name for name in together if name in said]
-        missing = [name for name in together if name not in said]
+        there = [name for name in together if name in names]
+        missing = [name for name in together if name not in names]
         if there and missing:
             raise Misdeclared(f"{where} has {there[0]}, but no {missing[0]}", there[0])
-    for name, value in said.items():
+    for name, value in names.items():
         if name in HOOKS and not isinstance(value, FunctionType):
             raise Misdeclared(f"{where}.{name} is not a function, but has the name of a hook", name)
     check_spelling(module, HOOKS)
-    return {name: said[name] for name in HOOKS if name in said}
+    return {name: names[name] for name in HOOKS if name in names}
 
 
 def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) -> list[str]:
@@ -239,8 +239,8 @@ def _types_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return the type of each argument: the one that most hooks declare."""
     found: dict[str, list[Any]] = {}
     for name, hint in hints.items():
-        said = [(argument, argument) for argument in _GROUPS if argument in hint]
-        for group, place in [*said, *([(_SAME[name], "return")] if name in _SAME else [])]:
+        pairs = [(argument, argument) for argument in _GROUPS if argument in hint]
+        for group, place in [*pairs, *([(_SAME[name], "return")] if name in _SAME else [])]:
             found.setdefault(group, []).append(form(hint[place]))
     types = {name: max(forms, key=forms.count) for name, forms in found.items()}
     return {**types, **_ARGUMENTS}

@@ -97,35 +97,42 @@ def define(name: str, module: ModuleType) -> Definition:
         Misdeclared: it is not a component.
 
     """
-    said = read_behaviour(module)
-    inputs = declared(said.inputs, "input")
-    direct = (*inputs, *([TIME.name] if said.takes("outputs", "t") else []))
-    if not said.takes("outputs", "inputs"):
+    behaviour = read_behaviour(module)
+    inputs = declared(behaviour.inputs, "input")
+    direct = (*inputs, *([TIME.name] if behaviour.takes("outputs", "t") else []))
+    if not behaviour.takes("outputs", "inputs"):
         direct = direct[len(inputs) :]
     outputs = declared(
-        said.outputs, "output", direct, tuple(inputs) if said.takes("start", "inputs") else ()
+        behaviour.outputs,
+        "output",
+        direct,
+        tuple(inputs) if behaviour.takes("start", "inputs") else (),
     )
-    own = ParameterSet(said.parameters, [*chain(*declared(said.parameters, "parameter").values())])
+    own = ParameterSet(
+        behaviour.parameters, [*chain(*declared(behaviour.parameters, "parameter").values())]
+    )
     ports = (
         *chain(*inputs.values()),
-        *_fed_through(said, outputs, inputs),
+        *_fed_through(behaviour, outputs, inputs),
         *own.ports,
-        *([] if said.h_max is None else [largest_step(said.h_max)]),
+        *([] if behaviour.h_max is None else [largest_step(behaviour.h_max)]),
     )
-    _check_names(said, ports)
+    _check_names(behaviour, ports)
     check_enumerations(ports)
     summary = (module.__doc__ or name).strip().partition("\n")[0].rstrip(".")
     origin = Origin(*(str(getattr(module, f"__{field}__", "")) for field in Origin._fields))
     for place, text in {"its docstring": summary, **origin._asdict()}.items():
         if not is_line(text.replace("\n", " ").replace("\t", " ")):
             raise Misdeclared(f"{place} is {text!r:.40}; write it without control characters")
-    noisy = tuple(port.name for port in outputs[said.noisy]) if said.noisy else ()
-    experiment = DefaultExperiment(said.stop, said.step)
-    return Definition(name, summary, origin, ports, experiment, own, noisy, said)
+    noisy = tuple(port.name for port in outputs[behaviour.noisy]) if behaviour.noisy else ()
+    experiment = DefaultExperiment(behaviour.stop, behaviour.step)
+    return Definition(name, summary, origin, ports, experiment, own, noisy, behaviour)
 
 
 def _fed_through(
-    said: Behaviour, outputs: Mapping[str, tuple[Port, ...]], inputs: Mapping[str, tuple[Port, ...]]
+    behaviour: Behaviour,
+    outputs: Mapping[str, tuple[Port, ...]],
+    inputs: Mapping[str, tuple[Port, ...]],
 ) -> Iterator[Port]:
     """Yield the outputs, with dependencies on ports in place of fields of the inputs."""
     names = {field: [port.name for port in ports] for field, ports in inputs.items()}
@@ -133,28 +140,32 @@ def _fed_through(
     names[TIME.name] = [TIME.name]
     for field, ports in outputs.items():
         for port in ports:
-            place = (said.outputs.__name__, field)
+            place = (behaviour.outputs.__name__, field)
             for one in (*port.feedthrough, *(port.initially or ())):
                 if one not in names:
                     why = f"depends on {one!r}; there are {', '.join(names)}"
                     raise Misdeclared(f"{'.'.join(place)} {why}", *place)
             direct = tuple(name for one in port.feedthrough for name in names[one])
-            if said.is_sampled and not {*direct} - {TIME.name}:
+            if behaviour.is_sampled and not {*direct} - {TIME.name}:
                 why = "is sampled with the inputs, so it has feedthrough; leave out feedthrough=()"
                 raise Misdeclared(f"{'.'.join(place)} {why}", *place)
             initial = (name for one in port.initially or () for name in names[one])
             yield replace(
                 port,
-                variability="discrete" if said.is_sampled else port.variability,
+                variability="discrete" if behaviour.is_sampled else port.variability,
                 feedthrough=direct,
                 initially=tuple(name for name in initial if name not in direct),
             )
 
 
-def _check_names(said: Behaviour, ports: tuple[Port, ...]) -> None:
+def _check_names(behaviour: Behaviour, ports: tuple[Port, ...]) -> None:
     """Refuse two ports of one name, and names that every component has."""
     taken = dict.fromkeys((FAULT.name, TIME.name), "every component")
-    made = {"input": said.inputs, "output": said.outputs, "parameter": said.parameters}
+    made = {
+        "input": behaviour.inputs,
+        "output": behaviour.outputs,
+        "parameter": behaviour.parameters,
+    }
     for port in ports:
         name = made[port.causality].__name__
         if port.name in taken:

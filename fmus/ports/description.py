@@ -245,8 +245,8 @@ def _variable(reference: int, port: Port) -> Element:
     return variable
 
 
-def _add_type(parent: Element, kind: str, name: str, **said: str) -> Element:
-    return SubElement(SubElement(parent, "SimpleType", name=name), kind, said)
+def _add_type(parent: Element, kind: str, name: str, **attributes: str) -> Element:
+    return SubElement(SubElement(parent, "SimpleType", name=name), kind, attributes)
 
 
 def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
@@ -307,8 +307,8 @@ def fmi3_build_description(name: str) -> bytes:
     return document(root)
 
 
-def _add_type_3(parent: Element, kind: str, name: str, **said: str) -> Element:
-    return SubElement(parent, f"{TYPES[kind]}Type", {"name": name, **said})
+def _add_type_3(parent: Element, kind: str, name: str, **attributes: str) -> Element:
+    return SubElement(parent, f"{TYPES[kind]}Type", {"name": name, **attributes})
 
 
 class _Variable(NamedTuple):

@@ -72,20 +72,20 @@ def declared(
             below = declared(inner, causality, direct, initial, before, start)
             fields[field] = tuple(chain(*below.values()))
             continue
-        said = _said(notes, causality, place, inner)
+        variable = _said(notes, causality, place, inner)
         check_type(hint, *place)
-        parts = list(_parts(inner, notes, said, start, prefix, place))
+        parts = list(_parts(inner, notes, variable, start, prefix, place))
         if causality == "parameter" and any(part.start is None for part in parts):
             raise _wrong(place, "has no default value, which a parameter starts with")
         if causality == "output":
-            if said.feedthrough is None:
-                said = replace(said, feedthrough=direct)
-            if said.initially is None:
-                said = replace(said, initially=initial)
-        ports = [_port(causality, said, part, place) for part in parts]
-        if len({part.unit for part in parts}) == 1 and "{}" not in (said.name or ""):
+            if variable.feedthrough is None:
+                variable = replace(variable, feedthrough=direct)
+            if variable.initially is None:
+                variable = replace(variable, initially=initial)
+        ports = [_port(causality, variable, part, place) for part in parts]
+        if len({part.unit for part in parts}) == 1 and "{}" not in (variable.name or ""):
             shape = _shape(inner, notes, place)[0]
-            array = Array(prefix + (said.name or field), said.description, shape)
+            array = Array(prefix + (variable.name or field), variable.description, shape)
             ports = [replace(port, array=array if shape else None) for port in ports]
         fields[field] = tuple(ports)
     return fields
@@ -110,26 +110,26 @@ def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner:
     if len(found) != 1:
         example = f'{place[-1]}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
         raise _wrong(place, f"has no unit and no description; write {example}")
-    [said] = found
+    [variable] = found
     for name, of in _ONLY.items():
-        if getattr(said, name) not in (None, False) and causality != of:
+        if getattr(variable, name) not in (None, False) and causality != of:
             raise _wrong(place, f"is no {of}, and {name} is for {of}s")
-    if causality == "output" and (said.minimum, said.maximum) != (None, None):
+    if causality == "output" and (variable.minimum, variable.maximum) != (None, None):
         raise _wrong(place, "is an output; minimum and maximum are for inputs and parameters")
     for name in ("feedthrough", "initially"):
-        names = getattr(said, name)
+        names = getattr(variable, name)
         if names is not None and not _are_different(names, _is_source):
             raise _wrong(place, f"has the {name} {names!r:.40}; write a tuple of different names")
-    if isinstance(said.unit, Mapping):
-        if said.members:
+    if isinstance(variable.unit, Mapping):
+        if variable.members:
             raise _wrong(place, "has its members twice: with their units, and without")
-        said = replace(said, members=tuple(said.unit))
-    if not _are_different(said.members, _is_member):
-        why = f"has the members {said.members!r:.40}; write a tuple of different names"
+        variable = replace(variable, members=tuple(variable.unit))
+    if not _are_different(variable.members, _is_member):
+        why = f"has the members {variable.members!r:.40}; write a tuple of different names"
         raise _wrong(place, why)
-    if not isinstance(said.description, str):
-        raise _wrong(place, f"has the description {said.description!r:.40}; write a text")
-    return said
+    if not isinstance(variable.description, str):
+        raise _wrong(place, f"has the description {variable.description!r:.40}; write a text")
+    return variable
 
 
 def _are_different(names: object, is_one: Any) -> bool:
@@ -157,22 +157,22 @@ def _word(hint: Any) -> str:
 def _parts(
     hint: Any,
     notes: tuple[Any, ...],
-    said: Variable,
+    variable: Variable,
     start: Any,
     prefix: str,
     place: tuple[str, ...],
 ) -> Iterator[_Part]:
     """Yield the numbers of a field in order."""
     shape, number = _shape(hint, notes, place)
-    if said.members and (len(shape) != 1 or shape[0] != len(said.members)):
+    if variable.members and (len(shape) != 1 or shape[0] != len(variable.members)):
         size = " x ".join(map(str, shape)) or "one"
-        raise _wrong(place, f"has {len(said.members)} members for {size} numbers")
-    members = said.members or [",".join(map(str, at)) for at in _places(shape)]
+        raise _wrong(place, f"has {len(variable.members)} members for {size} numbers")
+    members = variable.members or [",".join(map(str, at)) for at in _places(shape)]
     starts = [None] * len(members) if start is None else list(_flat(start, shape, place))
-    base = prefix + (place[-1] if said.name is None else said.name)
+    base = prefix + (place[-1] if variable.name is None else variable.name)
     for member, first in zip(members, starts):
-        unit = said.unit[member] if isinstance(said.unit, Mapping) else said.unit
-        yield _Part(str(member), _named(base, member, said.members), unit, number, first)
+        unit = variable.unit[member] if isinstance(variable.unit, Mapping) else variable.unit
+        yield _Part(str(member), _named(base, member, variable.members), unit, number, first)
 
 
 def _named(base: str, member: str | int, members: tuple[str | int, ...]) -> str:
@@ -221,29 +221,29 @@ def _flat(start: Any, shape: tuple[int, ...], place: tuple[str, ...]) -> Iterato
             yield from _flat(part, shape[1:], place)
 
 
-def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -> Port:
+def _port(causality: str, variable: Variable, part: _Part, place: tuple[str, ...]) -> Port:
     kind, start, choices = _fmi_type(part, place)
     if kind != "Real" and part.unit != "1":
         raise _wrong(place, f"is of the type {_word(part.type)}; only a float has a unit")
-    variability = "tunable" if said.tunable else "fixed"
+    variability = "tunable" if variable.tunable else "fixed"
     if causality != "parameter":
         variability = "continuous" if kind == "Real" else "discrete"
-    label = "" if said.name and "{}" in said.name else part.member
+    label = "" if variable.name and "{}" in variable.name else part.member
     try:
         port = Port(
             part.name,
             causality,
             variability,
             kind,
-            ": ".join(filter(None, (said.description, label))),
+            ": ".join(filter(None, (variable.description, label))),
             (part.unit or None) if kind == "Real" else None,
             start,
-            said.minimum,
-            said.maximum,
+            variable.minimum,
+            variable.maximum,
             choices,
             part.type.__name__ if choices else "",
-            tuple(name.replace("{}", part.member) for name in said.feedthrough or ()),
-            tuple(name.replace("{}", part.member) for name in said.initially or ()),
+            tuple(name.replace("{}", part.member) for name in variable.feedthrough or ()),
+            tuple(name.replace("{}", part.member) for name in variable.initially or ()),
         )
         port.checked(start)
     except Misdeclared as error:

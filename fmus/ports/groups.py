@@ -156,8 +156,10 @@ def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
     if kind in (Vector, Matrix):
         sizes = sizes_in(notes)
         if len(sizes) != (1 if kind is Vector else 2) or min(sizes) < 1:
-            said = f"{kind.__name__}, {'3' if kind is Vector else '2, 3'}{', ...' if notes else ''}"
-            why = f"is a {kind.__name__} without its size; write Annotated[{said}]"
+            example = (
+                f"{kind.__name__}, {'3' if kind is Vector else '2, 3'}{', ...' if notes else ''}"
+            )
+            why = f"is a {kind.__name__} without its size; write Annotated[{example}]"
             raise Misdeclared(f"{where}{why}", *place)
     elif is_class(kind, IntEnum):
         for name, member in kind.__members__.items():

@@ -82,12 +82,12 @@ def read_reducer(module: ModuleType) -> Reducer:
         Misdeclared: it is not an index.
 
     """
-    where, said = module.__name__, vars(module)
+    where, names = module.__name__, vars(module)
     check_spelling(module, HOOKS)
     for name in HOOKS:
-        if not isinstance(said.get(name), FunctionType):
+        if not isinstance(names.get(name), FunctionType):
             raise Misdeclared(f"{where} has no function {name}; an index has {', '.join(HOOKS)}")
-    hooks: dict[str, FunctionType] = {name: said[name] for name in HOOKS}
+    hooks: dict[str, FunctionType] = {name: names[name] for name in HOOKS}
     hints = {name: types_of_hook(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = _types(where, hints)
     inputs = declared(types["inputs"], "input")
@@ -104,7 +104,7 @@ def read_reducer(module: ModuleType) -> Reducer:
         {port.name: port.start for port in optional if port.start is not None},
         results,
         {field: _meaning(types["outputs"], field) for field in results},
-        seconds_in(said, "LAST", None),
+        seconds_in(names, "LAST", None),
     )
 
 
@@ -124,8 +124,8 @@ def _results(outputs: Any) -> dict[str, tuple[Port, ...]]:
 
 
 def _meaning(outputs: Any, field: str) -> str:
-    [said] = (one for one in split(fields_of(outputs)[field])[1] if isinstance(one, Variable))
-    return str(said.description)
+    [variable] = (one for one in split(fields_of(outputs)[field])[1] if isinstance(one, Variable))
+    return str(variable.description)
 
 
 def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

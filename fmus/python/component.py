@@ -119,7 +119,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        said = self.definition.behaviour
+        behaviour = self.definition.behaviour
         self._store = Store(self.ports)
         self._store.groups = self.unpack(self._store.inputs)
         self._mode = INSTANTIATED
@@ -131,9 +131,9 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         self._outputs_follow = "inputs" in self.outputs_of
         self._derived_follows = "inputs" in self.derived_of
         self._is_timed = "t" in self.outputs_of | self.derived_of
-        self._is_sampled = said.is_sampled
+        self._is_sampled = behaviour.is_sampled
         #: True if a step evaluates the outputs at its end, since no input changes them.
-        self._is_prompt = not (said.is_sampled or self._outputs_follow)
+        self._is_prompt = not (behaviour.is_sampled or self._outputs_follow)
         self._has_loader = has_loader(self.resources)
         #: Reason of a failed call that PythonFMU answered with fmi2OK; without a loader only.
         self._failure = ""
@@ -499,8 +499,8 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             self._fail(f"state refused: {self.describe(error)}")
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
-        store, said = self._store, self.definition.behaviour
-        wanted = checked(saved, self._identity(), store, said)
+        store, behaviour = self._store, self.definition.behaviour
+        wanted = checked(saved, self._identity(), store, behaviour)
         state, noise = wanted["state"], None
         if state is None:
             store.parameters = wanted["parameters"]
@@ -509,8 +509,8 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             if not self.square(state) <= LARGEST_STATE * LARGEST_STATE:
                 raise Refusal(f"it exceeds {LARGEST_STATE:g}")
             self.check_state(meaning[0], state)
-            if said.draws:
-                noise = Noise.restored(wanted["generator"], said.draws)
+            if behaviour.draws:
+                noise = Noise.restored(wanted["generator"], behaviour.draws)
             # The instance is unchanged up to here, and nothing after this can fail.
             self._adopt(wanted["parameters"], meaning)
         store.inputs, store.groups = wanted["inputs"], self.unpack(wanted["inputs"])

@@ -295,7 +295,7 @@ def _checksum(snapshot: Mapping[str, Any]) -> int:
 
 
 def checked(
-    saved: Mapping[str, Any], identity: str, store: Store, said: Behaviour
+    saved: Mapping[str, Any], identity: str, store: Store, behaviour: Behaviour
 ) -> dict[str, Any]:
     """Return a copy of a saved state, if it is a possible state of a component.
 
@@ -326,9 +326,9 @@ def checked(
         raise Refusal("it has a state before the initialisation")
     if state is None and mode == STEPPING:
         raise Refusal("it has steps without a state")
-    sampled = store.output_references if said.is_sampled and state is not None else []
+    sampled = store.output_references if behaviour.is_sampled and state is not None else []
     draws = restored(
-        GenericAlias(tuple, (float,) * (state is not None) * said.draws), saved["draws"]
+        GenericAlias(tuple, (float,) * (state is not None) * behaviour.draws), saved["draws"]
     )
     check_draws(*draws)
     parameters = saved["parameters"]
@@ -342,7 +342,7 @@ def checked(
         "outputs": _values(store, sampled, saved["outputs"]),
         "fresh": bool(sampled) and saved["fresh"],
         "held": bool(sampled) and saved["held"],
-        "state": None if state is None else restored(said.state, state),
+        "state": None if state is None else restored(behaviour.state, state),
         "draws": draws,
         "generator": _frozen(saved["generator"]),
     }

@@ -28,8 +28,8 @@ def reason(error: BaseException) -> str:
         return "out of memory"
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     more = [f"and {len(lines) - _MOST_LINES} more lines"] * (len(lines) > _MOST_LINES)
-    said = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
-    return "; ".join(said).replace(":; ", ": ") or repr(error)
+    shown = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
+    return "; ".join(shown).replace(":; ", ": ") or repr(error)
 
 
 def unforeseen(error: Exception) -> str:
