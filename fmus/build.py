@@ -87,14 +87,6 @@ def _report(line: str) -> None:
     print(f"{line}\n", end="", flush=True)
 
 
-def chosen_loader(destination: Path, wanted: str | None) -> str:
-    """Return the wanted loader, else the loader of the present FMUs, else the best one."""
-    before = built_before(destination / MANIFEST)
-    is_current = before.get("fingerprint") == fingerprint(PYTHON)
-    kept = before["settings"].get("loader") if is_current else None
-    return wanted or kept or best_loader()
-
-
 def main() -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m fmus.build", description=__doc__)
@@ -169,7 +161,11 @@ def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:
     if options.kind == PYTHON:
         if options.platforms is not None or options.fmi != FMI_VERSIONS[0] or options.arrays:
             raise ValueError("--platforms, --fmi 3 and --arrays need --kind native")
-        return PythonKind(chosen_loader(options.out, options.loader))
+        # By default the loader of the present FMUs is kept.
+        before = built_before(options.out / MANIFEST)
+        is_current = before.get("fingerprint") == fingerprint(PYTHON)
+        kept = before["settings"].get("loader") if is_current else None
+        return PythonKind(options.loader or kept or best_loader())
     if options.loader is not None:
         raise ValueError("--loader is for --kind python: the other kind loads no Python")
     wanted = platforms(options.fmi, options.platforms)

@@ -236,20 +236,15 @@ def _range(port: Port) -> str:
 
 def fmu_documents(source: Source, kind: str = PYTHON, fmi: str = "2") -> dict[str, bytes]:
     """Return the documentation and reference results of an FMU, by their paths in it."""
-    documents = {"documentation/index.html": component_html(source, kind, fmi).encode()}
-    if related := related_files(source):
-        text = f"{_REFERENCE.format(name=source.name)}\n"
-        documents["documentation/fmi-ls-ref.txt"] = text.encode()
+    related, reference = related_files(source), _REFERENCE.format(name=source.name)
+    head = [_LINK.sub(r"\1 (`\2` of the project)", source.page)]
+    head += [_NATIVE] if kind == NATIVE else []
+    page = page_of(source.definition, head, fmi, [reference] if related else ())
+    html = html_of(source.name, page, source.definition.origin.citation)
+    documents = {"documentation/index.html": html.encode()}
+    if related:
+        documents["documentation/fmi-ls-ref.txt"] = f"{reference}\n".encode()
     return documents | related
-
-
-def component_html(source: Source, kind: str = PYTHON, fmi: str = "2") -> str:
-    """Write the page of a component as one HTML file."""
-    made_of = (_NATIVE,) if kind == NATIVE else ()
-    reference = (_REFERENCE.format(name=source.name),) if related_files(source) else ()
-    text = _LINK.sub(r"\1 (`\2` of the project)", source.page)
-    page = page_of(source.definition, (text, *made_of), fmi, reference)
-    return html_of(source.name, page, source.definition.origin.citation)
 
 
 def html_of(title: str, page: str, citation: str = "") -> str:

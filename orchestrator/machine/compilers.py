@@ -162,11 +162,6 @@ def this_machine() -> str:
     return f"{_PROCESSORS.get(processor, processor)}-{platform.system().lower()}"
 
 
-def library_ending() -> str:
-    """Return the suffix of libraries on this machine."""
-    return _ENDINGS.get(platform.system().lower(), ".so")
-
-
 # Compilers
 
 
@@ -384,7 +379,8 @@ def load_library(category: str, key: str, function: str, make: Callable[[], byte
     """
 
     def made() -> CDLL:
-        [place] = write_cached(category, key, {f"{category}{library_ending()}": make()})
+        suffix = _ENDINGS.get(platform.system().lower(), ".so")
+        [place] = write_cached(category, key, {f"{category}{suffix}": make()})
         return CDLL(str(place))
 
     return found_or_made(category, lambda: find_library(category, key, function), made)

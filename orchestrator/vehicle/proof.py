@@ -169,13 +169,6 @@ def _sampling(system: System, loop: Loop) -> list[str]:
     ]
 
 
-def missing_for_certificates(table: Table, loop: Loop = STANDARD) -> list[str]:
-    """Return the ports and parameters for certificates that a run lacks."""
-    return table.missing(
-        _columns(loop), (*_gains(loop), *loop.limits, *loop.vehicle_parameters, loop.ell)
-    )
-
-
 def _columns(loop: Loop) -> tuple[str, ...]:
     """Return the columns that certificates are computed from."""
     return (
@@ -244,8 +237,10 @@ class CertificatesFile:
         """Find out if the run has the columns and parameters for certificates."""
         self._every = every(self._interval, header)
         table = Table.of(header, np.empty((0, 1 + len(header.columns))))
-        self._is_possible = not missing_for_certificates(table, self._loop)
-        columns = _columns(self._loop) if self._is_possible else ()
+        loop = self._loop
+        parameters = (*_gains(loop), *loop.limits, *loop.vehicle_parameters, loop.ell)
+        self._is_possible = not table.missing(_columns(loop), parameters)
+        columns = _columns(loop) if self._is_possible else ()
         # Keep only these columns: rows of many vehicles are long.
         self._places = [0, *(header.place[name] for name in columns)]
         self._header = replace(header, columns=columns)
