@@ -38,7 +38,7 @@ class Noise:
         """Make a generator from its state.
 
         Raises:
-            Exception: none has.
+            Exception: the state is invalid.
 
         """
         generator = Random()
