@@ -1,19 +1,20 @@
-"""The FMU components, and what turns them into FMUs.
+"""The components, and the tools that turn them into FMUs.
 
 ====================== ======================================================================
-module                 what it states
+module                 content
 ====================== ======================================================================
-:mod:`.ports`          what a port is, the groups that ports come in, a component's hooks
+:mod:`.ports`          ports, groups of ports, hooks of components, descriptions
+:mod:`.language`       the language of equations, as typed trees
 :mod:`.kinds`          kinds of FMU, versions of FMI
-:mod:`.discovery`      which components there are, what FMUs are made from, their archives
+:mod:`.discovery`      the bundled components, sources of FMUs, archives
 :mod:`.documentation`  the page of each component
 :mod:`.python`         the Python kind of FMU, on PythonFMU
 :mod:`.native`         the C kind of FMU, translated from the same text
-:mod:`.build`          the command that brings a folder of FMUs up to date
-:mod:`.script`         a user's own component: where it is, and its mistakes in words
-:mod:`.check`          the command that lists all mistakes in it
-:mod:`.trial`          its run as plain Python
+:mod:`.build`          command: bring a folder of FMUs up to date
+:mod:`.script`         a user's component: its files, and messages about its mistakes
+:mod:`.check`          command: list all mistakes in a component
+:mod:`.trial`          a run of a component as plain Python
 ====================== ======================================================================
 
-Every other folder is a component: its module and its page.
+Every other folder is a component: its module, page and reference results.
 """

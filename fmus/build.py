@@ -1,13 +1,12 @@
-"""Build the FMU of every component, or of a user's own: `python -m fmus.build [SCRIPT] --out DIR`.
+"""Build the FMUs of all components, or of a user's one: `python -m fmus.build [SCRIPT] --out DIR`.
 
-Runs in a separate process, because PythonFMU imports what it builds. Writes a file of the bundle
-only if the sources have changed since it was written, and a user's always.
+It runs in a separate process, because PythonFMU imports the components that it builds. An FMU of
+the bundle is written only if its sources have changed; a user's FMU is always written.
 """
 
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -30,18 +29,18 @@ from fmus.python.packaging import LOADERS, PythonKind, best_loader, build_script
 from fmus.script import (
     data_files,
     is_component,
+    message_of,
     no_component,
     script_in,
     source_of_script,
-    told,
 )
-from orchestrator.machine.compilers import compiler_for
-from orchestrator.machine.platforms import platforms
+from orchestrator.machine.compilers import compiler_for, platforms
+from orchestrator.machine.disk import sha256_of
 
-#: Exit status if the user's script cannot be built; 2 is for what else is wrong.
+#: Exit status if the user's script cannot be built; other errors give 2.
 FAILED = 1
 
-#: The file that says what a folder of FMUs was built from, and what was built.
+#: The file in a folder of FMUs that records their sources and digests.
 MANIFEST = "build.json"
 
 
@@ -62,18 +61,18 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> None:
         path: source_of(component)
         for component in components()
         if not (path := destination / f"{component}.fmu").is_file()
-        or digests.get(path.name) != _digest(path)
+        or digests.get(path.name) != sha256_of(path)
     }
     with ThreadPoolExecutor(kind.side_by_side) as pool:
         list(pool.map(lambda path: kind.write(stale[path], path), stale))
     if stale:
-        digests |= {path.name: _digest(path) for path in stale}
+        digests |= {path.name: sha256_of(path) for path in stale}
         text = json.dumps({**made_from, "sha256": digests})
         manifest.write_text(text + "\n", encoding="utf-8")
 
 
 def built_before(manifest: Path) -> dict[str, Any]:
-    """What a manifest says; empty if there is none, or it is not ours."""
+    """Read a manifest; empty if there is none, or another program wrote it."""
     try:
         content = json.loads(manifest.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -83,25 +82,13 @@ def built_before(manifest: Path) -> dict[str, Any]:
     return content if ours else {}
 
 
-def _tell(line: str) -> None:
-    """Say at once what was made, in one piece: others are made at the same time."""
+def _report(line: str) -> None:
+    """Print a line at once and in one piece, since several threads print."""
     print(f"{line}\n", end="", flush=True)
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def chosen_loader(destination: Path, wanted: str | None) -> str:
-    """The loader asked for; None: the one that is there, else native if it can be compiled."""
-    before = built_before(destination / MANIFEST)
-    there = before.get("fingerprint") == fingerprint(PYTHON)
-    kept = before["settings"].get("loader") if there else None
-    return wanted or kept or best_loader()
-
-
 def main() -> int:
-    """Command line of the module."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m fmus.build", description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("fmus", "dist"), help="folder to write")
     parser.add_argument("--kind", choices=KINDS, default=KINDS[0])
@@ -126,7 +113,7 @@ def main() -> int:
 
 
 def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind, home: str) -> int:
-    """Build the FMU of the user's component, or say in a line where it has a mistake."""
+    """Build the FMU of a user's component, or print its first mistake; return the exit status."""
     try:
         path = script_in(path)
         if not is_component(path) and not isinstance(kind, PythonKind):
@@ -137,7 +124,7 @@ def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind, home: st
     try:
         if is_component(path):
             source = source_of_script(path)
-            # Before PythonFMU imports a copy, in which mistakes would be elsewhere.
+            # Read it before PythonFMU imports a copy, where mistakes would have other places.
             source.definition  # noqa: B018
             fmu = folder / f"{source.name}.fmu"
             kind.write(source, fmu)
@@ -147,13 +134,13 @@ def _build_own(path: Path, folder: Path, kind: PythonKind | NativeKind, home: st
         origin = Origin(fmu.name, kind.name, home, path.name, _digests(path))
         add_to_archive(fmu, ORIGIN, json.dumps(origin._asdict()).encode())
     except Exception as error:
-        print(told(error, path), file=sys.stderr)
+        print(message_of(error, path), file=sys.stderr)
         return FAILED
     return 0
 
 
 def _digests(script: Path) -> dict[str, str]:
-    """The digests of all files of the user's that an FMU was made from."""
+    """Return the digests of all the user's files that an FMU was made from."""
     root = script.resolve().parent
     files = modules_of(f"import {script.stem}", {}, root)
     return {
@@ -164,23 +151,27 @@ def _digests(script: Path) -> dict[str, str]:
 
 
 def _kind(options: argparse.Namespace) -> PythonKind | NativeKind:
-    """The kind that the options ask for.
+    """Make the kind that the options describe.
 
     Raises:
-        ValueError: they do not go together.
+        ValueError: the options contradict each other.
         OSError: there is no compiler for them.
 
     """
     if options.kind == PYTHON:
         if options.platforms is not None or options.fmi != FMI_VERSIONS[0] or options.arrays:
             raise ValueError("--platforms, --fmi 3 and --arrays need --kind native")
-        return PythonKind(chosen_loader(options.out, options.loader))
+        # By default the loader of the present FMUs is kept.
+        before = built_before(options.out / MANIFEST)
+        is_current = before.get("fingerprint") == fingerprint(PYTHON)
+        kept = before["settings"].get("loader") if is_current else None
+        return PythonKind(options.loader or kept or best_loader())
     if options.loader is not None:
         raise ValueError("--loader is for --kind python: the other kind loads no Python")
     wanted = platforms(options.fmi, options.platforms)
     if options.arrays and options.fmi == FMI_VERSIONS[0]:
         raise ValueError("--arrays needs --fmi 3")
-    return NativeKind(options.fmi, wanted, compiler_for(wanted), _tell, options.arrays)
+    return NativeKind(options.fmi, wanted, compiler_for(wanted), _report, options.arrays)
 
 
 if __name__ == "__main__":

@@ -1,9 +1,9 @@
-"""List all that is wrong with a component or an index of one's own: `python -m fmus.check SCRIPT`.
+"""List all mistakes in a user's component or index: `python -m fmus.check SCRIPT`.
 
-A line for each mistake, with its file and line: what is wrong with its declaration, and what is
-outside the language of equations. If there is none in a component, the FMUs of both kinds are
-written, the native one without libraries, and the compiler reads its C. It runs in a separate
-process, because it imports the script.
+Each mistake is printed on a line, with its file and line: errors in declarations, and code outside
+the language of equations. For a component without mistakes the FMUs of both kinds are written, the
+native one without libraries, and the compiler checks its C. The command runs in a separate process,
+because it imports the script.
 """
 
 from __future__ import annotations
@@ -21,24 +21,25 @@ from fmus.discovery import Source, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from fmus.language.build import Program, Untranslatable, position
 from fmus.language.types import PLACED
-from fmus.native.packaging import MAIN, fmu_entries
+from fmus.native.packaging import fmu_entries
 from fmus.ports import reducer
 from fmus.ports.behaviour import HOOKS
+from fmus.ports.description import SOURCES
 from fmus.python.packaging import PythonKind
-from fmus.script import is_component, no_component, script_in, source_of_script, told
+from fmus.script import is_component, message_of, no_component, script_in, source_of_script
 from orchestrator.machine.compilers import Compiler, check_sources
 
 
 def mistakes(path: Path, folder: Path, is_index: bool = False) -> list[str]:
-    """All that is wrong with a component or an index, by file and line.
+    """Return all mistakes in a component or an index, sorted by file and line.
 
     Args:
-        path: of its script, or of the folder of its name.
-        folder: that its FMUs are written into, if nothing is wrong.
-        is_index: whether it is an index; else what it says decides.
+        path: its script, or the folder of its name.
+        folder: folder for its FMUs, which are written if there are no mistakes.
+        is_index: True for an index; otherwise its hooks decide.
 
     Raises:
-        ValueError: it is no component.
+        ValueError: it is not a component.
 
     """
     script = script_in(path)
@@ -50,11 +51,11 @@ def mistakes(path: Path, folder: Path, is_index: bool = False) -> list[str]:
     found: dict[str, str] = {}
     try:
         for text in _mistakes(script, folder, is_index):
-            # One line of the script has one mistake: others follow from it.
+            # Report the first problem of each line only: others follow from it.
             place = PLACED.match(text)
             found.setdefault(place[0] if place else text, text)
     except RecursionError as error:
-        found[""] = told(error, script)
+        found[""] = message_of(error, script)
     return sorted(found.values(), key=position)
 
 
@@ -63,13 +64,13 @@ def _mistakes(script: Path, folder: Path, is_index: bool) -> Iterator[str]:
     try:
         module = import_module(source.module)
     except Exception as error:
-        yield told(error, script)
+        yield message_of(error, script)
         return
     is_index = is_index or reducer.is_reducer(module)
     hooks = (getattr(module, name, None) for name in (reducer.HOOKS if is_index else HOOKS))
     program = Program(*(hook for hook in hooks if isinstance(hook, FunctionType)))
     for mistake in program.mistakes:
-        yield told(Untranslatable(mistake), script)
+        yield message_of(Untranslatable(mistake), script)
     try:
         if is_index:
             reducer.read_reducer(module)
@@ -78,14 +79,14 @@ def _mistakes(script: Path, folder: Path, is_index: bool) -> Iterator[str]:
         if not program.mistakes:
             write(source, folder)
     except Exception as error:
-        yield told(error, script)
+        yield message_of(error, script)
 
 
 def write(source: Source, folder: Path) -> None:
-    """Write the FMUs of a component for all versions of FMI, native ones without libraries.
+    """Write the FMUs of a component for all versions of FMI, the native ones without libraries.
 
     Raises:
-        Exception: what a build would raise.
+        Exception: as a build would.
 
     """
     for fmi in FMI_VERSIONS:
@@ -94,20 +95,20 @@ def write(source: Source, folder: Path) -> None:
         texts = {
             name.removeprefix(head): text for name, text in entries.items() if name.startswith(head)
         }
-        check_sources(source.name, texts, MAIN[fmi])
+        check_sources(source.name, texts, SOURCES[fmi])
         write_archive(folder / f"{NATIVE}-{fmi}.fmu", entries)
     PythonKind("plain").write(source, folder / f"{PYTHON}.fmu")
 
 
 def main() -> int:
-    """Command line of the module."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(prog="python -m fmus.check", description=__doc__)
     parser.add_argument("script", type=Path)
     parser.add_argument("--index", action="store_true", help="it is an index of a study")
     parser.add_argument("--out", type=Path, help="folder to write FMUs into; default: none")
     options = parser.parse_args()
     try:
-        # What the component prints is no finding.
+        # Keep the component's own output apart from the list.
         with TemporaryDirectory() as folder, redirect_stdout(sys.stderr):
             found = mistakes(options.script, options.out or Path(folder), options.index)
         print("".join(f"{text}\n" for text in found), end="")

@@ -1,4 +1,4 @@
-"""What FMUs are made from: component folders and all that they need. What they become: archives."""
+"""The bundled components, the sources of FMUs, and their archives."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ import zipfile
 from collections.abc import Mapping
 from importlib import import_module
 from importlib.metadata import distribution
-from importlib.util import find_spec
 from inspect import cleandoc
 from pathlib import Path
 from typing import NamedTuple
@@ -18,39 +17,32 @@ from xml.etree import ElementTree
 
 from fmus.kinds import CONTAINED
 from fmus.ports.definition import Definition, define
+from orchestrator.machine.identity import package_folder
 
 #: The folder of a component that holds its reference results.
 REFERENCE = "reference"
 
-#: Where FMI-LS-REF has them in an FMU, and the file there that names them.
+#: Their folder in an FMU according to FMI-LS-REF, and the file that lists them.
 RELATED = "extra/org.fmi-standard.fmi-ls-ref"
 RELATED_MANIFEST = "fmi-ls-manifest.xml"
 
-#: The oldest time a zip archive can hold: the time of a build is not part of its result.
+#: The oldest time in a zip archive, used for all entries so that builds are reproducible.
 _EPOCH = (1980, 1, 1, 0, 0, 0)
 
 
-def package_folder(package: str) -> Path:
-    """Where an installed package is; only the packages that it lies in are imported."""
-    specification = find_spec(package)
-    assert specification is not None and specification.submodule_search_locations
-    [folder] = specification.submodule_search_locations
-    return Path(folder)
-
-
 def lies_in(folder: Path, file: Path, module: str) -> bool:
-    """Whether a module's top-level package stands in a folder, and not in one further below."""
+    """Return True if a module's top-level package is directly in a folder."""
     top = module.partition(".")[0]
     return folder in file.parents and file.relative_to(folder).parts[0] in (top, f"{top}.py")
 
 
 def name_of(module: str) -> str:
-    """The name of a component, from that of its module or folder: `water_tank`, `WaterTank`."""
+    """Make the name of a component from its module or folder: `WaterTank` from `water_tank`."""
     return "".join(word[:1].upper() + word[1:] for word in module.split("_"))
 
 
 def components() -> dict[str, str]:
-    """The name of every component, and its module."""
+    """Return the modules of all bundled components, by the names of the components."""
     return {
         name_of(file.parent.name): f"fmus.{file.parent.name}.component"
         for file in sorted(package_folder("fmus").glob("*/page.md"))
@@ -58,13 +50,13 @@ def components() -> dict[str, str]:
 
 
 class Source(NamedTuple):
-    """What the FMU of a component is made from.
+    """Source of a component's FMU.
 
     Attributes:
-        name: of the component.
-        module: that says it all.
-        folder: that its page and its reference results lie in.
-        root: that it is imported from; None: it is installed.
+        name: name of the component.
+        module: name of its module.
+        folder: folder of its page and its reference results.
+        root: folder that it is imported from; None if it is installed.
 
     """
 
@@ -75,35 +67,35 @@ class Source(NamedTuple):
 
     @property
     def definition(self) -> Definition:
-        """What its module says; it is imported.
+        """Definition of the component, whose module is imported.
 
         Raises:
-            Misdeclared: it is no component.
+            Misdeclared: it is not a component.
 
         """
         return define(self.name, import_module(self.module))
 
     @property
     def page(self) -> str:
-        """What its author says of it, in Markdown: in `page.md`, or in the docstring."""
+        """Its author's description in Markdown, from `page.md` or the docstring."""
         page = self.folder / "page.md"
         if self.root is None and page.is_file():
             return page.read_text(encoding="utf-8").strip()
-        said = cleandoc(import_module(self.module).__doc__ or "")
-        return f"# {self.name}\n\n{said}".strip()
+        text = cleandoc(import_module(self.module).__doc__ or "")
+        return f"# {self.name}\n\n{text}".strip()
 
 
 def source_of(name: str) -> Source:
-    """What a component of the bundle is made from."""
+    """Return the source of a bundled component."""
     module = components()[name]
     return Source(name, module, package_folder(module.rpartition(".")[0]))
 
 
 def related_files(source: Source) -> dict[str, bytes]:
-    """The reference results that an FMU of a component carries, by their places in it.
+    """Read the reference results of a component, by their paths in its FMU.
 
     Returns:
-        The manifest and the files that it names; empty if the component has none.
+        The manifest and the files that it lists; empty if the component has none.
 
     """
     folder = source.folder / REFERENCE
@@ -116,7 +108,7 @@ def related_files(source: Source) -> dict[str, bytes]:
 
 
 def licences(kind: str) -> str:
-    """Licence of the bundle, and of what else FMUs of a kind contain."""
+    """Return the licences of the bundle and of the packages in FMUs of a kind."""
     heads = {"auv-fmu": "auv-fmu", "pythonfmu": "PythonFMU, contained in resources and binaries"}
     return "\n\n".join(
         f"{heads[package]}\n\n{distribution(package).read_text('licenses/LICENSE') or ''}"
@@ -125,16 +117,16 @@ def licences(kind: str) -> str:
 
 
 def fingerprint(kind: str) -> str:
-    """Hash of everything installed that FMUs of a kind are made of, the same on all machines.
+    """Return a hash of all installed sources of FMUs of a kind, the same on all machines.
 
-    Not of the tools: a C compiler, and what makes a page of Markdown.
+    It does not include the tools, such as C compilers and Markdown renderers.
     """
     digest = hashlib.sha256()
     for package in ("auv_fmu", "fmus", *CONTAINED[kind]):
         root = package_folder(package)
         files = {path.relative_to(root).as_posix(): path for path in root.rglob("*")}
         for name, path in sorted(files.items()):
-            # The first is Python's own, the second what was built of them.
+            # Skip byte code, and built FMUs.
             if path.is_file() and path.suffix != ".pyc" and not name.startswith("dist/"):
                 digest.update(f"{package}/{name}\0".encode())
                 digest.update(path.read_bytes())
@@ -143,14 +135,14 @@ def fingerprint(kind: str) -> str:
 
 
 class Origin(NamedTuple):
-    """What the FMU of a user's script was made from, as it is recorded in the FMU.
+    """Record in an FMU of the user's script that it was made from.
 
     Attributes:
-        fmu: name of the file of the FMU.
-        kind: of the FMU.
-        folder: of the script, from that of the FMU on.
-        script: its name.
-        digests: of the files, by their paths from the folder of the script on.
+        fmu: file name of the FMU.
+        kind: kind of the FMU.
+        folder: folder of the script, relative to the folder of the FMU.
+        script: file name of the script.
+        digests: digests of the files, by their paths relative to the folder of the script.
 
     """
 
@@ -161,7 +153,7 @@ class Origin(NamedTuple):
     digests: Mapping[str, str]
 
     def changed(self, fmu: Path) -> list[Path]:
-        """The files that are others now than when an FMU was built; none, if there is no script."""
+        """Return the files that changed since an FMU was built; none if there is no script."""
         folder = self.place(fmu)
         if not (folder / self.script).is_file():
             return []
@@ -169,16 +161,16 @@ class Origin(NamedTuple):
         return [path for path, digest in paths.items() if digest_at(path) != digest]
 
     def place(self, fmu: Path) -> Path:
-        """The folder of the script of an FMU."""
+        """Return the folder of the script of an FMU."""
         return Path(os.path.normpath(fmu.parent / self.folder))
 
 
-#: Where an FMU has it.
+#: Its path in an FMU.
 ORIGIN = "extra/auv-fmu/origin.json"
 
 
 def origin_of(content: bytes) -> Origin | None:
-    """What a record of an origin says; None: it is none of ours."""
+    """Read the record of an origin; None if another program wrote it."""
     try:
         origin = Origin(**json.loads(content))
         names = [origin.fmu, origin.script, *origin.digests]
@@ -190,7 +182,7 @@ def origin_of(content: bytes) -> Origin | None:
 
 
 def digest_at(path: Path) -> str | None:
-    """The SHA-256 of a file, whatever ends its lines; None: there is no such file."""
+    """Return the SHA-256 of a file, with any line endings; None if there is no such file."""
     try:
         content = path.read_bytes() if path.is_file() else None
     except OSError:
@@ -201,13 +193,13 @@ def digest_at(path: Path) -> str | None:
 
 
 def add_to_archive(path: Path, name: str, content: bytes) -> None:
-    """Add an entry to an archive, whose bytes still depend only on its entries."""
+    """Add an entry to an archive; its bytes still depend only on its entries."""
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr(_info(name), content, compresslevel=9)
 
 
 def write_archive(path: Path, entries: dict[str, bytes]) -> None:
-    """Write a zip archive whose bytes depend only on its entries, all at once."""
+    """Write a zip archive atomically; its bytes depend only on its entries."""
     partial = path.with_name(f".{path.name}.{uuid.uuid4().hex}")
     try:
         with zipfile.ZipFile(partial, "w") as archive:
@@ -227,7 +219,7 @@ def _info(name: str) -> zipfile.ZipInfo:
 
 
 def digest_of(contents: Mapping[str, bytes]) -> bytes:
-    """What tells contents from all others."""
+    """Return a digest of files by name."""
     digest = hashlib.sha256()
     for name in sorted(contents):
         digest.update(f"{name}\0{len(contents[name])}\0".encode())
@@ -236,5 +228,5 @@ def digest_of(contents: Mapping[str, bytes]) -> bytes:
 
 
 def guid_of(digest: bytes) -> str:
-    """A GUID made from a digest."""
+    """Make a GUID from a digest."""
     return f"{{{uuid.UUID(bytes=digest[:16])}}}"

@@ -1,7 +1,7 @@
 """Pages of the components, from their `page.md` and their declared ports.
 
-The build puts them as HTML into each FMU, with what holds for all FMUs; `tools/pages.py` writes
-them into docs/reference/components.
+Each FMU contains its page as HTML, together with sections that all FMUs share; `tools/pages.py`
+writes the pages into docs/reference/components.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from auv_fmu.language.variable import POSITIVE
 from fmus.discovery import Source, related_files
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.definition import Model
-from fmus.ports.description_fmi3 import TYPES
+from fmus.ports.description import TYPES
 from fmus.ports.port import FAULT, Port
 
-#: The picture of every component.
+#: The icon of every component.
 ICON = Path(__file__).with_name("icon.png")
 
 _HTML = Path(__file__).with_name("page.html")
@@ -52,13 +52,13 @@ refused get has no consequence. fmi2GetReal also gives the numbers of Integers a
 With logging off, the reason of an fmi2Error is logged, and no other. The complete table of calls,
 states and bad arguments is in `docs/reference/fmi-answers.md` of the project."""
 
-#: The place in a list of things that have members.
+#: An index in a list of groups.
 _PLACE = re.compile(r"\[\d+\]\.")
 
-#: A link to another page of the project, which an FMU does not hold.
+#: A link to another page of the project, which is not in the FMU.
 _LINK = re.compile(r"\[([^]]+)\]\(\.\./\.\./(docs/[^)]+)\)")
 
-#: The last part of a name, where it has several.
+#: The last part of a name with several parts.
 _MEMBER = re.compile(r"(?:\.\w+|\[[\d,]+\])$")
 
 _NATIVE = """\
@@ -99,23 +99,19 @@ If the FMU has a parameter `h_max`, a longer step is split evenly, with held inp
 
 
 def component_page(source: Source) -> str:
-    """Write the page of a component in Markdown: what it is, its ports, and more of it.
+    """Write the page of a component in Markdown: its description with its ports.
 
-    What holds for all components is in docs/reference/components/README.md.
+    Sections that all components share are in docs/reference/components/README.md.
     """
     page = source.page.replace("](../../docs/", "](../../")
     return _joined(_parted(page, _tables(source.definition.ports, {})))
 
 
 def page_of(model: Model, head: Sequence[str], fmi: str = "2", more: Sequence[str] = ()) -> str:
-    """The page of a model in Markdown, as its FMU holds it.
+    """Write the page of a model in Markdown for its FMU.
 
-    Args:
-        model: that it is about.
-        head: what it is; its ports stand before the second heading of the first text.
-        fmi: version.
-        more: what stands before the example.
-
+    The ports come before the second heading of the first text in `head`, and `more` before the
+    example.
     """
     refusals = _REFUSALS
     if fmi == "3":
@@ -132,7 +128,7 @@ def _joined(parts: Iterable[str]) -> str:
 
 
 def _parted(page: str, tables: Iterable[str]) -> Iterator[str]:
-    """A page with the tables of ports before its second heading."""
+    """Yield the parts of a page, with the tables of ports before its second heading."""
     first, heading, rest = page.partition("\n\n## ")
     yield first
     yield from tables
@@ -141,7 +137,7 @@ def _parted(page: str, tables: Iterable[str]) -> Iterator[str]:
 
 
 def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
-    """The tables of inputs, outputs and parameters, with other names for their types."""
+    """Yield the tables of inputs, outputs and parameters; `types` renames types."""
     for causality, heading in (
         ("input", "Inputs"),
         ("output", "Outputs"),
@@ -162,9 +158,9 @@ def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
 
 
 def _alike(ports: Sequence[Port]) -> Iterable[list[list[Port]]]:
-    """The ports of each row: the members of a group that differ in nothing else, as `y.x`, `y.y`.
+    """Group ports into rows: members of a group, such as `y.x` and `y.y`, that differ in no cell.
 
-    Of each member the ports of a list, as `waypoint[1].x` to `waypoint[9].x`, most often one.
+    Each member is a list of ports, such as `waypoint[1].x` to `waypoint[9].x`, most often of one.
     """
     rows: dict[object, dict[str, list[Port]]] = {}
     for port in ports:
@@ -176,14 +172,14 @@ def _alike(ports: Sequence[Port]) -> Iterable[list[list[Port]]]:
 
 
 def _described(port: Port) -> str:
-    """The description without the name of a member at its end."""
+    """Return the description without the name of a member at its end."""
     found = _MEMBER.search(port.name)
     end = f": {found[0].strip('.[]')}" if found else ""
     return port.description.removesuffix(end).replace("|", r"\|")
 
 
 def _groups(port: Port) -> str:
-    """The groups of inputs that an output follows at once."""
+    """Return the groups of inputs with direct feedthrough to an output."""
     groups = dict.fromkeys(name.split(".")[0] for name in port.feedthrough)
     return ", ".join(f"`{group}`" for group in groups)
 
@@ -207,7 +203,7 @@ def _row(members: Sequence[Sequence[Port]], types: Mapping[str, str]) -> list[st
 
 
 def _names(ports: Sequence[Port]) -> str:
-    """The name of the first, and the last parts of the others' names."""
+    """Return the name of the first port, and the last parts of the others' names."""
     first, *others = (port.name for port in ports)
     ends = (match[0] for match in map(_MEMBER.search, others) if match)
     return f"`{' '.join((first, *ends))}`"
@@ -239,25 +235,20 @@ def _range(port: Port) -> str:
 
 
 def fmu_documents(source: Source, kind: str = PYTHON, fmi: str = "2") -> dict[str, bytes]:
-    """What an FMU of a component holds for its user, by the places in it."""
-    documents = {"documentation/index.html": component_html(source, kind, fmi).encode()}
-    if related := related_files(source):
-        text = f"{_REFERENCE.format(name=source.name)}\n"
-        documents["documentation/fmi-ls-ref.txt"] = text.encode()
+    """Return the documentation and reference results of an FMU, by their paths in it."""
+    related, reference = related_files(source), _REFERENCE.format(name=source.name)
+    head = [_LINK.sub(r"\1 (`\2` of the project)", source.page)]
+    head += [_NATIVE] if kind == NATIVE else []
+    page = page_of(source.definition, head, fmi, [reference] if related else ())
+    html = html_of(source.name, page, source.definition.origin.citation)
+    documents = {"documentation/index.html": html.encode()}
+    if related:
+        documents["documentation/fmi-ls-ref.txt"] = f"{reference}\n".encode()
     return documents | related
 
 
-def component_html(source: Source, kind: str = PYTHON, fmi: str = "2") -> str:
-    """The page of a component as one HTML file."""
-    made_of = (_NATIVE,) if kind == NATIVE else ()
-    reference = (_REFERENCE.format(name=source.name),) if related_files(source) else ()
-    text = _LINK.sub(r"\1 (`\2` of the project)", source.page)
-    page = page_of(source.definition, (text, *made_of), fmi, reference)
-    return html_of(source.name, page, source.definition.origin.citation)
-
-
 def html_of(title: str, page: str, citation: str = "") -> str:
-    """A page in Markdown as one HTML file."""
+    """Render a page in Markdown as one HTML file."""
     body = MarkdownIt("commonmark").enable("table").render(page)
     body = body.replace("<table>", '<div class="table"><table>')
     body = body.replace("</table>", "</table></div>")

@@ -1,7 +1,7 @@
-"""A component of the user's own: where it is, what its FMU is made from, and its mistakes in words.
+"""A user's component: its script, modules and data files, and messages about its mistakes.
 
-It is a script with the function `outputs`, or a folder with such a script of its name. Any other
-script holds a slave of PythonFMU.
+It is a script with the function `outputs`, or a folder that contains such a script with its name.
+Any other script is taken for a slave of PythonFMU.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from types import CodeType
 from fmus.discovery import Source, lies_in, name_of
 from fmus.ports.port import Misdeclared
 
-#: The function that tells a component from a slave of PythonFMU.
+#: The function that a component has, and a slave of PythonFMU lacks.
 _FUNCTION = "outputs"
 
 
 def script_in(path: Path) -> Path:
-    """The script that a path means: itself, or the one in a folder that has its name.
+    """Return the script at a path: the file itself, or the one in a folder with its name.
 
     Raises:
         ValueError: there is none.
@@ -48,9 +48,9 @@ def script_in(path: Path) -> Path:
 
 
 def is_component(path: Path) -> bool:
-    """Whether a script is a component, and not a slave of PythonFMU.
+    """Return True if a script is a component, and not a slave of PythonFMU.
 
-    One that is no Python is taken for a component: a mistake in it is told in the same way.
+    A script with a syntax error is taken for a component, so that the error is reported.
     """
     try:
         tree = ast.parse(path.read_bytes())
@@ -61,7 +61,7 @@ def is_component(path: Path) -> bool:
 
 
 def no_component(path: Path) -> str:
-    """What is said of a script that is no component."""
+    """Return the message about a script that is not a component."""
     return f"{path}: not a component, which has a function outputs() (see `auv-fmu new`)"
 
 
@@ -73,13 +73,10 @@ def _defined(node: ast.stmt) -> Iterator[str]:
 
 
 def source_of_script(path: Path) -> Source:
-    """What the FMU of a component is made from; its modules can be imported from now on.
-
-    Args:
-        path: as :func:`script_in` gives it.
+    """Return the source of a component, and let its modules be imported from now on.
 
     Raises:
-        ValueError: its name cannot be that of a module.
+        ValueError: its name cannot be the name of a module.
 
     """
     place = path.resolve()
@@ -100,7 +97,7 @@ def source_of_script(path: Path) -> Source:
 
 
 class _Text(SourceFileLoader):
-    """Loads a module from its text: byte code beside it is neither believed nor written."""
+    """A loader that reads the source only: byte code is neither read nor written."""
 
     def get_code(self, fullname: str) -> CodeType:
         path = self.get_filename(fullname)
@@ -109,9 +106,9 @@ class _Text(SourceFileLoader):
 
 
 def import_from(root: Path) -> None:
-    """Let modules of a folder be imported, from their texts, before all others.
+    """Let modules of a folder be imported from their sources, before all other modules.
 
-    From then on the data files that they read there are remembered.
+    From then on, data files that they read in the folder are recorded.
     """
 
     def finder(folder: str) -> FileFinder:
@@ -130,37 +127,37 @@ def import_from(root: Path) -> None:
 
 
 def _is_of(module: object, place: Path) -> bool:
-    """Whether a module, or one below it, is that of a place."""
+    """Return True if a module or package has its file or folder at a place."""
     file, folders = getattr(module, "__file__", None), getattr(module, "__path__", ())
     return str(place) in map(str, (file, *folders))
 
 
 # Data files
 
-#: The files that were read in folders of scripts, by their paths from there.
+#: Data files that were read in folders of scripts, by their paths relative to the folder.
 _read: dict[Path, dict[str, Path]] = {}
 
-#: Endings of what is no data: modules, and what is made of them.
+#: Suffixes of modules and of files made from them, which are not data.
 _NO_DATA = (".py", ".pyc", ".pyi", ".fmu")
 
 
 def _watch(root: Path) -> None:
-    """Remember from now on which data files are read in the folder of a script, and below it."""
+    """Record from now on the data files that are read in the folder of a script, and below it."""
     if not _read:
         sys.addaudithook(_see)
     _read.setdefault(root, {})
 
 
 def data_files(root: Path) -> dict[str, Path]:
-    """The data files that modules in a folder have read there, by their paths from there."""
+    """Return the data files that modules of a folder have read in it, by their relative paths."""
     return {name: path for name, path in _read.get(root, {}).items() if path.is_file()}
 
 
 def _see(event: str, arguments: tuple[object, ...]) -> None:
-    """Take note of a file that Python opens.
+    """Record a file that Python opens: an audit hook.
 
     Raises:
-        ValueError: its path begins in the current folder, which is another one in a host.
+        ValueError: its path is relative to the current folder, which is another one in a host.
 
     """
     if event != "open" or not isinstance(arguments[0], (str, bytes, os.PathLike)):
@@ -183,7 +180,7 @@ def _see(event: str, arguments: tuple[object, ...]) -> None:
 
 
 def _is_open_in(root: Path) -> bool:
-    """Whether a module in a folder is being run, from which others may be called."""
+    """Return True if code of a module in a folder is on the stack."""
     return any(
         lies_in(root, Path(frame.f_code.co_filename), str(frame.f_globals.get("__name__")))
         for frame, _ in traceback.walk_stack(None)
@@ -191,7 +188,7 @@ def _is_open_in(root: Path) -> bool:
 
 
 def _is_data(path: Path, root: Path) -> bool:
-    """Whether a file below a folder is neither a module nor a file of an installed package."""
+    """Return True for a file in a folder that is neither a module nor in an installed package."""
     parts = path.relative_to(root).parts
     if path.suffix in _NO_DATA or any(part.startswith((".", "__pycache__")) for part in parts):
         return False
@@ -202,31 +199,25 @@ def _is_data(path: Path, root: Path) -> bool:
 # Mistakes
 
 
-def told(error: BaseException, path: Path) -> str:
-    """What an error in a component says, in one line that begins with the file and the line.
-
-    Args:
-        error: of an import, a declaration, a translation or a compiler.
-        path: the script as the user has named it.
-
-    """
+def message_of(error: BaseException, path: Path) -> str:
+    """Return the message of an error in a component, on one line with its file and line."""
     text, frames, root = str(error), _frames(error, path), path.resolve().parent
     is_ours = isinstance(error, (OSError, TypeError, ValueError)) or _is_our_own(error)
-    place, said = str(path), text if is_ours else f"{type(error).__name__}: {text}"
+    place, message = str(path), text if is_ours else f"{type(error).__name__}: {text}"
     if isinstance(error, Misdeclared):
         place = _place_of(error.place, path)
     elif isinstance(error, SyntaxError):
         place = f"{shown(error.filename or '', path)}:{error.lineno}"
-        said = f"SyntaxError: {error.msg}"
+        message = f"SyntaxError: {error.msg}"
     elif isinstance(error, RecursionError) and not frames:
-        said = "an expression is too long: take it apart"
+        message = "an expression is too long: take it apart"
     elif frames and not _is_our_own(error):
-        place, said = frames[-1], f"{type(error).__name__}: {text}"
+        place, message = frames[-1], f"{type(error).__name__}: {text}"
     elif text.startswith((f"{path}:", f"{root}{os.sep}")):
-        # It says where it is.
-        beside = str(path.parent / "x")[:-1]
-        return " ".join(text.replace(f"{root}{os.sep}", beside).split())
-    return " ".join(f"{place}: {said}".split())
+        # The message has its place already.
+        folder = str(path.parent / "x")[:-1]
+        return " ".join(text.replace(f"{root}{os.sep}", folder).split())
+    return " ".join(f"{place}: {message}".split())
 
 
 def _is_our_own(error: BaseException) -> bool:
@@ -234,14 +225,14 @@ def _is_our_own(error: BaseException) -> bool:
 
 
 def shown(file: str, path: Path) -> str:
-    """A file beside a script, or the script, as the user would name it; others as they are."""
+    """Return the path of a file in the script's folder as the user would give it."""
     root = path.resolve().parent
-    file_is_in = Path(file).is_relative_to(root)
-    return str(path.parent / Path(file).relative_to(root)) if file_is_in else file
+    is_inside = Path(file).is_relative_to(root)
+    return str(path.parent / Path(file).relative_to(root)) if is_inside else file
 
 
 def _frames(error: BaseException, path: Path) -> list[str]:
-    """Where an error passed through the user's files, the innermost last."""
+    """Return the places in the user's files through which an error passed, the innermost last."""
     root = path.resolve().parent
     return [
         f"{shown(file, path)}:{line}"
@@ -252,7 +243,7 @@ def _frames(error: BaseException, path: Path) -> list[str]:
 
 
 def _place_of(place: tuple[str, ...], path: Path) -> str:
-    """Where a class or a function is, with its line, or a field or argument of it."""
+    """Return the file and line of a class or function, or of its field or argument."""
     for node in ast.parse(path.read_bytes()).body if place else ():
         if not isinstance(node, (ast.ClassDef, ast.FunctionDef)) or node.name != place[0]:
             continue
@@ -266,7 +257,7 @@ def _place_of(place: tuple[str, ...], path: Path) -> str:
 
 
 def _fields(node: ast.ClassDef) -> Iterator[tuple[str, int]]:
-    """The fields of a class, or its members, and their lines."""
+    """Yield the fields or members of a class, and their lines."""
     for part in node.body:
         targets = getattr(part, "targets", [getattr(part, "target", None)])
         yield from ((name.id, part.lineno) for name in targets if isinstance(name, ast.Name))

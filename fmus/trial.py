@@ -1,7 +1,7 @@
 """Run a component as plain Python, for its tests and for a debugger.
 
-The component runs in the class that its FMU of the Python kind holds, with the same checks, so its
-numbers are those of the FMU:
+The component runs in the class that its FMU of the Python kind contains, with the same checks, so
+it gives the same numbers as the FMU:
 
     import pid
     from fmus.trial import run
@@ -9,7 +9,7 @@ numbers are those of the FMU:
     result = run(pid, {"k_p": 2.0}, lambda t: {"measured": 0.1 * t}, stop_time=10.0, step=0.1)
     assert result["command"][-1] < 1.0
 
-Breakpoints in its file work, and what it raises goes on to the caller.
+Breakpoints in its file work, and its exceptions reach the caller.
 """
 
 from __future__ import annotations
@@ -22,10 +22,11 @@ from typing import Any, Union
 
 from auv_fmu.language.quantities import group_name
 from fmus.discovery import name_of
+from fmus.ports.groups import flat
 from fmus.ports.port import Port
 from fmus.python.slave import slave_of
 
-#: Inputs by the names of their ports, or a function of the time that gives them.
+#: Inputs by the names of their ports, or a function of the time that returns them.
 Inputs = Union[Mapping[str, Any], Callable[[float], Mapping[str, Any]]]
 
 
@@ -41,21 +42,21 @@ def run(
     """Run a component on its own.
 
     Args:
-        module: of the component.
-        parameters: by the names of their ports; others have their default values.
-        inputs: of each time; those that are not named keep their values.
-        stop_time: end of the run [s], or the nearest end of a step.
+        module: module of the component.
+        parameters: values by the names of their ports; other parameters have their defaults.
+        inputs: values at each time; inputs without a value keep the last one.
+        stop_time: end of the run [s], rounded to the nearest end of a step.
         step: length of a communication step [s].
-        start_time: begin of the run [s].
+        start_time: start of the run [s].
 
     Returns:
-        The time, and each output by the name of its port: values at the start, with these inputs,
-        and after each step, with those of its end.
+        The time, and each output by the name of its port: at the start and after each step, with
+        the inputs of that time.
 
     Raises:
-        ValueError: there is no such port, or the times make no run.
-        Refusal: the component does not take a value or a step; the text says why.
-        Exception: whatever the component raises.
+        ValueError: there is no such port, or the times are invalid.
+        Refusal: the component refuses a value or a step; the text gives the reason.
+        Exception: raised by the component.
 
     """
     if not (step > 0.0 and isfinite(step) and stop_time >= start_time):
@@ -85,49 +86,43 @@ def run(
 
 
 def _ports(slave: Any, causality: str) -> list[tuple[int, Port]]:
-    """The ports of a causality, and their value references."""
+    """Return the ports of a causality with their value references."""
     ports = enumerate(slave._store.ports)
     return [(reference, port) for reference, port in ports if port.causality == causality]
 
 
 def _set(slave: Any, causality: str, values: Mapping[str, Any]) -> None:
-    """Set ports of a causality, one by one or all of a vector."""
+    """Set ports of a causality, singly or as whole vectors."""
     known = _ports(slave, causality)
     for name, value in values.items():
         found = [one for one in known if name in (one[1].name, group_name(one[1].name))]
         if not found:
             names = ", ".join(port.name for _, port in known) or "none"
             raise ValueError(f"no {causality} {name!r}; there are: {names}")
-        given = [value] if found[0][1].name == name else _flat(value)
+        given = [value] if found[0][1].name == name else [*flat(value)]
         if len(given) != len(found):
             raise ValueError(f"{name}: {len(given)} values for {len(found)} ports")
         for (reference, port), one in zip(found, given):
-            getattr(slave, f"set_{_passed_as(port)}")([reference], [_meant(port, one)])
+            getattr(slave, f"set_{_passed_as(port)}")([reference], [_converted(port, one)])
     if causality == "input":
-        # Those that stay as they are belong to a new time.
+        # Unchanged inputs are inputs of a new time, too.
         slave._forget("inputs")
 
 
 def _raised(slave: object, error: BaseException) -> str:
-    """Raise what a slave would tell its host."""
+    """Raise an error that a slave would report to its host."""
     raise error
 
 
 def _passed_as(port: Port) -> str:
-    """The type of the calls that pass a port's values, in small letters."""
+    """Return the type in the names of the functions that pass a port's values."""
     return "integer" if port.type == "Enumeration" else port.type.lower()
 
 
-def _meant(port: Port, value: Any) -> Any:
-    """A value of the type that a port takes; choices have names."""
+def _converted(port: Port, value: Any) -> Any:
+    """Convert a value, or the name of a choice, to the type of a port."""
     if port.type == "Real" and not isinstance(value, str):
         return float(value)
     if port.type == "Enumeration":
         value = port.choices.get(value, value)
     return int(value) if isinstance(value, IntEnum) else value
-
-
-def _flat(value: Any) -> list[Any]:
-    """The numbers of a vector or a matrix, row by row."""
-    is_group = isinstance(value, (tuple, list))
-    return [x for part in value for x in _flat(part)] if is_group else [value]

@@ -58,7 +58,7 @@ from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.studies.study_file import read_study
 from orchestrator.studies.study_result import StudyResult
-from orchestrator.vehicle.distances import SMALLEST_DISTANCE_LABEL, smallest_distances
+from orchestrator.vehicle.indices import SMALLEST_DISTANCE_LABEL, smallest_distances
 from orchestrator.vehicle.signals import (
     ACTUATORS,
     AXES,

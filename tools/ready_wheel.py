@@ -22,9 +22,8 @@ from fmus.kinds import FMI_VERSIONS, NATIVE, PYTHON
 from orchestrator.cosim import loop
 from orchestrator.live import assembly, module
 from orchestrator.live.presets import bundled
-from orchestrator.machine.compilers import COMPILERS, compiler_for, library
+from orchestrator.machine.compilers import COMPILERS, TARGETS, compiler_for, library, platforms
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.platforms import TARGETS, platforms
 from orchestrator.runs import bundle
 
 ROOT = Path(__file__).parents[1]

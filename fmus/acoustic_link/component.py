@@ -12,7 +12,7 @@ from auv_fmu.language.vectors import Vector3
 
 
 class Inputs(NamedTuple):
-    """Where both vehicles are."""
+    """Positions of both vehicles."""
 
     y: Annotated[Vector3, Variable(POSITION, "Measured control point of the sender")]
     eta: Annotated[Vector3, Variable(EULER, "Measured Euler angle of the sender")]
@@ -20,7 +20,7 @@ class Inputs(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What the receiver knows of the sender."""
+    """Last known state of the sender, and counts of messages."""
 
     y_0: Annotated[
         Vector3,
@@ -44,23 +44,23 @@ class Outputs(NamedTuple):
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse modems that would always have too many messages under way."""
+    """Refuse modems that would always have too many messages in transit."""
     acoustic_link.check(parameters)
 
 
 def start(parameters: Parameters, inputs: Inputs, t: float) -> LinkState:
-    """State at the start."""
+    """Return the state at the start."""
     return acoustic_link.first_state(parameters, inputs.y, inputs.eta, t)
 
 
 def update(
     parameters: Parameters, state: LinkState, inputs: Inputs, t: float, h: float
 ) -> LinkState:
-    """State after a step; positions are those at its beginning."""
+    """Return the state after a step, from the positions at its beginning."""
     return acoustic_link.advance(parameters, state, inputs.y, inputs.eta, inputs.receiver, t, h)
 
 
 def outputs(state: LinkState, t: float) -> Outputs:
-    """What has arrived."""
+    """Return the newest message that has arrived, and the counts."""
     newest = state.newest
     return Outputs(newest.y, newest.eta, t - newest.sent, state.received, state.lost)

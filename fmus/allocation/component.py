@@ -10,5 +10,5 @@ SAMPLED = True
 
 
 def outputs(parameters: Parameters, inputs: Wanted) -> Allocated:
-    """Commands of fins and propeller, and what they give."""
+    """Return the commands of fins and propeller, and the resulting force and moments."""
     return evaluate(parameters, inputs.tau, inputs.nu_r)

@@ -14,13 +14,13 @@ from auv_fmu.paper.plant import Parameters, PlantOutputs, PlantState
 
 H_MAX = STEP
 
-#: By how much the square of the length of a normalised quaternion is off, and the share of its
-#: range by which an actuator with a lag may leave it.
+#: Error of the squared length of a normalised quaternion, and the share of its range by which an
+#: actuator with a lag may exceed its limits.
 _ROUNDING = 2e-12
 
 
 class Inputs(NamedTuple):
-    """Commanded force and moments, the disturbance, and how the water moves."""
+    """Commanded force and moments, the disturbance, and the motion of the water."""
 
     tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments")]
     tau_w: Annotated[Vector6, Variable(TAU_W, "Disturbance, with the sign of (2)")]
@@ -33,14 +33,14 @@ class Inputs(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What follows from the state."""
+    """Values derived from the state."""
 
     rotation: Rotation  #: body to earth
     motion: PlantOutputs
 
 
 class Outputs(NamedTuple):
-    """What is seen of the vehicle."""
+    """Motion of the vehicle, and the applied force and moments."""
 
     eta: Annotated[
         Vector6,
@@ -78,7 +78,7 @@ class Outputs(NamedTuple):
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse limits that leave an actuator nothing, and a start with a roll that is held."""
+    """Refuse empty ranges of actuators, and a start with a roll that is held at zero."""
     lower, upper = parameters.limits
     _check_limits("u", lower[0], upper[0])
     _check_limits("q", lower[1], upper[1])
@@ -99,12 +99,12 @@ def _check_roll(name: str, value: float) -> None:
 
 
 def start(parameters: Parameters, inputs: Inputs) -> PlantState:
-    """State at the start."""
+    """Return the state at the start."""
     return plant.begin(parameters, plant.flow(parameters, inputs.water))
 
 
 def derive(parameters: Parameters, state: PlantState) -> Seen:
-    """All that is seen of the state."""
+    """Return the rotation and the outputs that follow from the state."""
     rotation = rotation_from_quaternion(state.quaternion)
     rolls = parameters.roll.rolls
     return Seen(rotation, plant.outputs(state, rotation, parameters.ell, rolls))
@@ -113,7 +113,7 @@ def derive(parameters: Parameters, state: PlantState) -> Seen:
 def update(
     parameters: Parameters, state: PlantState, derived: Seen, inputs: Inputs, h: float
 ) -> PlantState:
-    """State after a step."""
+    """Return the state after a step."""
     tau, water = plant.applied(parameters, inputs.tau), plant.flow(parameters, inputs.water)
     return plant.advance(
         parameters, state, derived.rotation, tau, inputs.tau_w, water, inputs.dwater, h
@@ -121,24 +121,24 @@ def update(
 
 
 def outputs(parameters: Parameters, state: PlantState, derived: Seen, inputs: Inputs) -> Outputs:
-    """What is seen of the vehicle; y has no noise yet."""
+    """Return the outputs; y has no noise yet."""
     euler, y, dy, nu, nu_r = derived.motion
     tau = plant.actuation(parameters, state, plant.applied(parameters, inputs.tau))
     return Outputs((*state.position, *euler), nu, y, dy, tau, nu_r)
 
 
 def seed(parameters: Parameters) -> int:
-    """Of the noise."""
+    """Return the seed of the noise."""
     return parameters.noise.seed
 
 
 def measured(parameters: Parameters, y: Vector3, n: Vector3) -> Vector3:
-    """The output y with noise, of three independent standard normal numbers."""
+    """Add noise to the output y, from three independent standard normal numbers."""
     return plant.measure(y, n, parameters.noise.std)
 
 
 def check_state(parameters: Parameters, state: PlantState) -> None:
-    """Refuse an attitude that is none, a roll where it is held, and forces beyond the limits."""
+    """Refuse an invalid quaternion, a roll that is held at zero, and forces beyond the limits."""
     a, b, c, d = state.quaternion
     if not abs(a * a + b * b + c * c + d * d - 1.0) <= _ROUNDING:
         raise Refusal("its quaternion is not of length one")

@@ -26,5 +26,5 @@ class Outputs(NamedTuple):
 
 
 def outputs(parameters: Disturbance, inputs: Inputs, t: float) -> Outputs:
-    """The disturbance at a time."""
+    """Return the disturbance at a time."""
     return Outputs(disturbance(parameters, inputs.nu, t))

@@ -26,23 +26,23 @@ class Outputs(NamedTuple):
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse stages that no vehicle can change between."""
+    """Refuse stages that no vehicle can follow one after another."""
     formation.check(parameters)
 
 
 def start(inputs: Known) -> FormationState:
-    """State at the start."""
+    """Return the state at the start."""
     return formation.first_state(inputs)
 
 
 def update(
     parameters: Parameters, state: FormationState, inputs: Known, h: float
 ) -> FormationState:
-    """State after a step."""
+    """Return the state after a step."""
     return formation.step(parameters, state, inputs, h)
 
 
 def outputs(parameters: Parameters, state: FormationState, inputs: Known, t: float) -> Outputs:
-    """The reference, from what is known of the leader now."""
+    """Return the reference, from the last known state of the leader."""
     wanted = formation.reference(parameters, state, inputs, t)
     return Outputs(wanted, formation.posture(parameters, state, wanted))

@@ -1,15 +1,15 @@
 """The language of equations: the part of Python that every kind of FMU can run, as typed trees.
 
 ==================== ===================================================================
-module               what it states
+module               content
 ==================== ===================================================================
-:mod:`.types`        types: numbers, arrays and records of them
-:mod:`.mathematics`  functions of `math`, and when they raise
-:mod:`.tree`         what programs consist of
-:mod:`.arrays`       the operators of vectors and matrices
-:mod:`.words`        what readers call the parts of a program, and what to write instead
-:mod:`.build`        the language: functions of Python as trees, and what is none
+:mod:`.types`        types: numbers, and arrays and records of them
+:mod:`.mathematics`  functions of `math`, and the cases in which they raise
+:mod:`.tree`         statements and expressions of programs
+:mod:`.arrays`       operators of vectors and matrices
+:mod:`.words`        names of Python's constructs, and advice on replacing some
+:mod:`.build`        translation of Python functions to trees, which defines the language
 ==================== ===================================================================
 
-`docs/explanation/language.md` describes it for readers.
+`docs/explanation/language.md` describes the language for users.
 """

@@ -1,4 +1,4 @@
-"""The operators of vectors and matrices: functions of their elements, in the order of Python's."""
+"""Operators of vectors and matrices as functions of elements, evaluated in Python's order."""
 
 from __future__ import annotations
 
@@ -33,15 +33,7 @@ from fmus.language.types import (
 def binary(
     functions: Functions, operator: ast.operator, left: Expression, right: Expression
 ) -> Expression | None:
-    """A sum, a difference, a product or a quotient; None: Python has none either.
-
-    Args:
-        functions: that get one more.
-        operator: between two operands.
-        left: the first one.
-        right: the other; a number is a float.
-
-    """
+    """Return a sum, a difference, a product or a quotient; None if Python defines none."""
     one, other = left.type, right.type
     if isinstance(operator, (ast.Add, ast.Sub)) and one == other and is_algebraic(one):
         name, sign = (
@@ -61,12 +53,12 @@ def binary(
 
 
 def negative(functions: Functions, operand: Expression) -> Expression:
-    """A vector or a matrix with all signs changed."""
+    """Return a vector or a matrix with all signs changed."""
     return Call(_each(functions, "negative", tree.NEGATIVE, operand.type), (operand,))
 
 
 def _each(functions: Functions, name: str, operator: tree.Operator, *types: Type) -> Function:
-    """The function of what an operator makes of each element of the first one."""
+    """Return the function that applies an operator to each element of the first argument."""
     given = dict(zip(("a", "b"), types))
 
     def body() -> Sequence[Statement]:
@@ -84,7 +76,7 @@ def _each(functions: Functions, name: str, operator: tree.Operator, *types: Type
 
 
 def _at(name: str, type_: Type, places: Sequence[Expression]) -> Expression:
-    """An element of an argument."""
+    """Return an element of an argument."""
     found: Expression = Local(name, type_)
     for place in places:
         found = Item(found, place)
@@ -92,7 +84,7 @@ def _at(name: str, type_: Type, places: Sequence[Expression]) -> Expression:
 
 
 def _loops(counters: Sequence[Local], n: Sequence[int], inner: Statement) -> Sequence[Statement]:
-    """A statement in loops over all places."""
+    """Return a statement in nested loops."""
     block = [inner]
     for counter, stop in reversed([*zip(counters, n)]):
         block = [tree.For(counter.name, int_of(0), int_of(stop), 1, stop, block)]
@@ -105,11 +97,11 @@ def _product(functions: Functions, left: Expression, right: Expression) -> Expre
         return None
     rows, columns = sizes(one)[:-1], sizes(other)[1:]
     if columns and not rows:
-        return None  # a row vector is no Vector
+        return None  # a row vector is not a Vector
     returns: Type = FLOAT
     if rows:
         returns = matrix(*rows, *columns) if columns else vector(*rows)
-    # A large matrix is not copied.
+    # Large matrices are not copied.
     by_address = "a" if rows and _is_stored(left) else ""
 
     def body() -> Sequence[Statement]:
@@ -140,14 +132,14 @@ def _product(functions: Functions, left: Expression, right: Expression) -> Expre
 
 
 def _is_stored(expression: Expression) -> bool:
-    """Whether a value has an address: a variable, a constant, one that is made, or a part."""
+    """Return True if a value has an address: a variable, constant, new value, or a part of one."""
     if isinstance(expression, (tree.Field, Item)):
         return _is_stored(expression.owner)
     return isinstance(expression, (Local, tree.Constant, tree.Make))
 
 
 def transpose(functions: Functions, operand: Expression) -> Expression:
-    """A matrix with columns for rows."""
+    """Return the transpose of a matrix."""
     rows, columns = sizes(operand.type)
     returns = matrix(columns, rows)
 
@@ -167,7 +159,7 @@ def transpose(functions: Functions, operand: Expression) -> Expression:
 
 
 def sum_of(functions: Functions, owner: Expression) -> Expression:
-    """The sum of a vector, from the first element to the last."""
+    """Return the sum of a vector, from the first element to the last."""
 
     def body() -> Sequence[Statement]:
         k, total = Local("k", INT), Local("total", FLOAT)
@@ -185,7 +177,7 @@ def sum_of(functions: Functions, owner: Expression) -> Expression:
 def replaced(
     functions: Functions, owner: Expression, place: Expression, value: Expression
 ) -> Expression:
-    """A copy with another element, or another row."""
+    """Return a copy with another element, or another row."""
     type_ = owner.type
     assert isinstance(type_, Array)
     given: dict[str, Type] = {"a": type_, "place": INT, "value": type_.item}
@@ -202,7 +194,7 @@ def replaced(
 
 
 def extreme(functions: Functions, word: str, operand: Expression) -> Expression:
-    """The smallest or the largest element of a tuple of numbers."""
+    """Return the smallest or the largest element of a tuple of numbers."""
     type_ = operand.type
     assert isinstance(type_, Array)
 
@@ -222,7 +214,7 @@ def extreme(functions: Functions, word: str, operand: Expression) -> Expression:
 
 
 def extreme_of_two(word: str, one: Expression, other: Expression) -> Expression:
-    """The smaller or the larger of two numbers of one type: the first, if they are equal."""
+    """Return the smaller or the larger of two numbers of one type; the first if they are equal."""
     operators = {
         ("min", True): tree.MIN, ("max", True): tree.MAX,
         ("min", False): tree.INT_MIN, ("max", False): tree.INT_MAX,

@@ -1,7 +1,7 @@
-"""The language of equations: what a function of Python is as a tree, or why it is none.
+"""The language of equations: translation of Python functions to trees.
 
-This is its definition: what has no tree is refused, with its line and, where there is one, a better
-way to write it. A mistake ends its statement only, so one pass finds those of all functions.
+This module defines the language: other constructs are refused, with their line and, if possible,
+advice. A mistake ends only its statement, so one pass finds the mistakes of all functions.
 """
 
 from __future__ import annotations
@@ -74,19 +74,19 @@ from fmus.language.words import advice, word_of
 from fmus.ports.behaviour import NUMBER_FORMAT
 from fmus.ports.groups import hints_of, is_class, is_record
 
-#: Compilers take brackets within brackets, but not any number of them.
+#: Deepest nesting of expressions, since compilers limit nested brackets.
 _DEEPEST = 200
 
-#: Blocks within each other, of which each `elif` is one, and cases of a `match`.
+#: Deepest nesting of blocks, including each `elif`, and most cases of a `match`.
 _MOST_BLOCKS = 100
 
-#: Said where Python's own stack ends.
+#: Message if Python's stack is exhausted.
 _TOO_DEEP = "too deep for Python: take expressions apart, or join functions that call each other"
 
-#: Packages whose functions all equations share.
+#: Packages whose functions all equations may call.
 _SHARED = frozenset(("auv_fmu", "fmus"))
 
-#: Exceptions that may be raised, and classes made from them.
+#: Exceptions that may be raised, with their subclasses.
 _EXCEPTIONS = (Refusal, ArithmeticError, AssertionError, RuntimeError, ValueError)
 
 _ARITHMETIC: Mapping[type, tuple[tree.Operator, tree.Operator]] = {
@@ -105,34 +105,34 @@ _COMPARISONS: Mapping[type, tree.Operator] = {
 
 
 def _power_of(base: Any, exponent: Any) -> Any:
-    """A power of an int that is no larger than sizes can be."""
+    """Compute a power of ints that may be a size."""
     are_ints = isinstance(base, int) and isinstance(exponent, int)
     if not are_ints or exponent not in range(32) or abs(base) > 2**31:
         raise OverflowError
     return base**exponent
 
 
-#: Operators between constants.
+#: Operators that are evaluated between constants.
 _FOLDED: Mapping[type, Callable[[float, float], float]] = {
     ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul,
     ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.Pow: _power_of,
 }  # fmt: skip
 
-#: Makes a value one that can be read in each turn of a loop, from its text, with a word for it.
+#: Returns a value for use in each turn of a loop; also takes its source, and a part of its name.
 _Hold = Callable[[Expression, ast.expr, str], Expression]
 
 
 class Untranslatable(Exception):
-    """Some of a program is outside the language; each argument is a mistake, with its place."""
+    """A program that is outside the language; each argument is a mistake with its place."""
 
     def __str__(self) -> str:
-        """The first mistake, and how many there are besides."""
+        """Return the first mistake, and the number of further ones."""
         first, *others = map(str, self.args)
         return f"{first} (and {len(others)} more: see auv-fmu check)" if others else first
 
 
 class _Outside(Exception):
-    """Something is outside the language: where, and why."""
+    """A construct outside the language: its node, and the reason."""
 
     def __init__(self, node: ast.AST, what: str) -> None:
         super().__init__(what)
@@ -140,21 +140,21 @@ class _Outside(Exception):
 
 
 class _Follows(Exception):
-    """Something follows from what has been refused already."""
+    """A mistake that follows from one that has been refused."""
 
 
 class Program:
-    """Functions as trees, with all that they call.
+    """Functions as trees, with all functions that they call.
 
     Attributes:
-        functions: by what they were made from, each after those that it calls.
+        functions: functions by their origin, each after those that it calls.
 
     """
 
     def __init__(self, *functions: FunctionType) -> None:
-        """Take functions."""
+        """Translate functions, and collect mistakes."""
         self.functions = tree.Functions()
-        #: Of modules, by their name and value: the first that uses one gives it its own name.
+        #: Constants of modules, by name and value.
         self.constants: dict[Hashable, tree.Constant] = {}
         self._begun: set[Hashable] = set()
         self._mistakes: dict[str, str] = {}
@@ -166,35 +166,35 @@ class Program:
 
     @property
     def mistakes(self) -> list[str]:
-        """All that is wrong with it: a line each, in the order of files and lines."""
+        """Messages of all mistakes, sorted by file and line."""
         return sorted((f"{place}{what}" for place, what in self._mistakes.items()), key=position)
 
     def check(self) -> None:
         """Refuse a program with mistakes.
 
         Raises:
-            Untranslatable: there are some.
+            Untranslatable: there is at least one.
 
         """
         if self._mistakes:
             raise Untranslatable(*self.mistakes)
 
     def refuse(self, place: str, what: str) -> None:
-        """Note a mistake; a line has one, as others follow from it."""
+        """Note a mistake; only the first one of each line, since others follow from it."""
         found = PLACED.match(what)
         if found:
             place, what = found[0], what[found.end() :]
         self._mistakes.setdefault(place, what)
 
     def function(self, function: FunctionType, types: Sequence[Type] = ()) -> Function:
-        """A function as a tree.
+        """Return a function as a tree.
 
         Args:
-            function: of Python, made by `def` in a module.
-            types: of its arguments, if some of them are vectors of any size.
+            function: a Python function, made by `def` in a module.
+            types: types of its arguments, if some of them are vectors of any size.
 
         Raises:
-            TypeError: it is none, or calls itself.
+            TypeError: it was not made by `def` in a module, or calls itself.
 
         """
         key = (function, *types)
@@ -217,15 +217,15 @@ class Program:
         return made
 
 
-def _told(error: Exception) -> str:
-    """What an error says, and of what class it is if it is none of ours."""
+def _message_of(error: Exception) -> str:
+    """Return the message of an error, with its class unless it is a TypeError."""
     if isinstance(error, RecursionError):
-        raise error  # where less is on the stack it is told
+        raise error  # reported where the stack has room again
     return str(error) if isinstance(error, TypeError) else f"{type(error).__name__}: {error}"
 
 
 def position(mistake: str) -> tuple[str, int]:
-    """The file and the line that a mistake is in; one without comes first."""
+    """Return the file and line of a mistake; a mistake without them comes first."""
     found = PLACED.match(mistake)
     file, _, number = found[0][:-2].rpartition(":") if found else ("", "", "0")
     return file, int(number)
@@ -237,14 +237,14 @@ def _module(path: str) -> ast.Module:
 
 
 def _definition(path: str, line: int) -> ast.FunctionDef | None:
-    """The function that begins at a line of a module."""
+    """Return the function that begins at a line of a module."""
     found = (n for n in _module(path).body if isinstance(n, ast.FunctionDef) and n.lineno == line)
     return next(found, None)
 
 
 @cache
 def _comments(path: str) -> dict[int, str]:
-    """The comments of a file after code, by line."""
+    """Return the comments after code in a file, by line."""
     with tokenize.open(path) as file:
         return {
             token.start[0]: token.string.lstrip("#: ")
@@ -253,8 +253,8 @@ def _comments(path: str) -> dict[int, str]:
         }
 
 
-def _is_at_hand(function: FunctionType, path: str, module: str) -> bool:
-    """Whether a function stands in this product, or beside the module that uses it."""
+def _is_included(function: FunctionType, path: str, module: str) -> bool:
+    """Return True if a function is in this product, or next to the module that uses it."""
     if function.__module__.partition(".")[0] in _SHARED:
         return True
     depth = module.count(".") + (Path(path).stem == "__init__")
@@ -263,11 +263,11 @@ def _is_at_hand(function: FunctionType, path: str, module: str) -> bool:
     return root in file.parents and "site-packages" not in file.relative_to(root).parts
 
 
-# Which names a piece of a program gives a value, and which it uses
+# Names that a piece of a program assigns, and names that it uses
 
 
 def _stored(*nodes: ast.AST) -> list[str]:
-    """Names that are given a value, but not in functions and expressions of their own."""
+    """Return the names that nodes assign, not in nested functions and expressions with `for`."""
     found: list[str] = []
     for node in nodes:
         if isinstance(node, ast.FunctionDef):
@@ -284,7 +284,7 @@ def _names(node: ast.AST) -> set[str]:
 
 
 def _free(*nodes: ast.AST) -> list[str]:
-    """Names that are used in code and belong to what is around it, in the order of their use."""
+    """Return the names that nodes use and do not define themselves, in the order of use."""
     found: list[str] = []
     for node in nodes:
         if isinstance(node, ast.Name):
@@ -309,17 +309,17 @@ def _arguments(node: ast.FunctionDef) -> list[ast.arg]:
 
 
 def _own(node: ast.FunctionDef) -> set[str]:
-    """The names of a function: of its arguments, and those that it gives a value."""
+    """Return the names of a function's arguments and variables."""
     return {*(argument.arg for argument in _arguments(node)), *_stored(*node.body)}
 
 
 def _is_none(node: ast.expr | None) -> bool:
-    """Whether there is no expression, or `None`."""
+    """Return True for a missing expression or `None`."""
     return node is None or (isinstance(node, ast.Constant) and node.value is None)
 
 
 def _beyond_loops(*nodes: ast.AST) -> set[str]:
-    """Names that occur elsewhere than in loops which give them a value."""
+    """Return the names that occur outside of the loops that assign them."""
     found: set[str] = set()
     for node in nodes:
         if isinstance(node, ast.For):
@@ -332,14 +332,14 @@ def _beyond_loops(*nodes: ast.AST) -> set[str]:
 
 
 class _Loop(NamedTuple):
-    """What a loop goes over.
+    """The head of a loop.
 
     Attributes:
-        counter: the number of the turn, or of a range.
-        start, stop, step: of it.
-        turns: how often it runs; None: that is not known before.
-        bound: names that get a value in each turn, and the value.
-        is_wide: whether the counter may pass the largest int.
+        counter: number of the turn, or number of a range.
+        start, stop, step: bounds and step of the counter.
+        turns: number of turns; None if it is not constant.
+        bound: names that are assigned in each turn, and their values.
+        is_wide: True if the counter may pass the largest int.
 
     """
 
@@ -352,23 +352,23 @@ class _Loop(NamedTuple):
     is_wide: bool = False
 
     def made(self, body: Sequence[Statement]) -> tree.For:
-        """It as a statement."""
-        name, of = self.counter.name, (self.start, self.stop, self.step, self.turns)
-        return tree.For(name, *of, body, self.is_wide)
+        """Return the loop with a body."""
+        name, numbers = self.counter.name, (self.start, self.stop, self.step, self.turns)
+        return tree.For(name, *numbers, body, self.is_wide)
 
 
-#: Names that have a value here, with its type.
+#: Names that have a value at a point of a function, with their types.
 _Known = dict[str, Type]
 
 
 class _Signature(NamedTuple):
-    """How something is called.
+    """The signature of a function or class.
 
     Attributes:
-        module, name: where it stands, and its own.
-        types: of its arguments, by their names; None: any vector or matrix.
-        unnamed, positional: how many of them must, and may, be given by their place.
-        defaults: values of some of them, of Python or as trees.
+        module, name: its module and name.
+        types: types of the arguments by name; None for a vector or matrix of any size.
+        unnamed, positional: numbers of arguments that must, and that may, be positional.
+        defaults: default values, as Python values or trees.
 
     """
 
@@ -381,7 +381,7 @@ class _Signature(NamedTuple):
 
 
 class _Callable(NamedTuple):
-    """A local function: as a tree, which gets what it captures after its arguments."""
+    """A local function as a tree; captured variables are further arguments."""
 
     function: Function
     signature: _Signature
@@ -389,14 +389,14 @@ class _Callable(NamedTuple):
 
 
 class _Each(NamedTuple):
-    """A function with a loop, on its way, that stands for an expression with a `for`.
+    """An unfinished function with a loop, for an expression with a `for`.
 
     Attributes:
-        builder: of the function.
-        given: its arguments, by their names in it.
-        loop: that it has.
+        builder: builder of the function.
+        given: arguments of the call, by their names in the function.
+        loop: head of the loop.
         turn: statements of each turn.
-        block: those that use the element: the same, or what stands under an `if` there.
+        block: statements that use the element: the same, or the body of an `if` among them.
 
     """
 
@@ -407,7 +407,7 @@ class _Each(NamedTuple):
     block: list[Statement]
 
     def call(self, before: Sequence[Statement], after: Expression) -> Expression:
-        """Call the function, of which some steps before the loop and the result are given."""
+        """Finish the function with statements before the loop and a result, and call it."""
         function = self.builder.made
         function.returns = after.type
         function.arguments = {name: value.type for name, value in self.given.items()}
@@ -417,13 +417,13 @@ class _Each(NamedTuple):
 
 
 class _Builder:
-    """Makes the tree of one function.
+    """Builds the tree of one function.
 
     Attributes:
         made: the function.
-        names: of its arguments and variables.
-        known: those that have a value here; None: here no step of the program comes.
-        functions: local functions by their names.
+        names: names of its arguments and variables.
+        known: names that have a value at the present statement; None if it is unreachable.
+        functions: local functions by name.
 
     """
 
@@ -435,29 +435,20 @@ class _Builder:
         made: Function,
         node: ast.FunctionDef | None = None,
     ) -> None:
-        """Begin with nothing.
-
-        Args:
-            program: that the function belongs to.
-            path: of its module.
-            scope: of its module.
-            made: the function.
-            node: its text; None: it is made of an expression.
-
-        """
+        """Begin an empty tree."""
         self.made, self.program, self.path, self.scope = made, program, path, scope
         self.node = node
         self.names: set[str] = set()
         self.known: _Known | None = {}
         self.functions: dict[str, _Callable] = {}
-        #: Variables in the tree, by their names and types.
+        #: Names of variables in the tree, by names and types in Python.
         self._variables: dict[tuple[str, Type], str] = {}
         self._taken: set[str] = set()
-        #: Names that are used beyond the loops that give them a value.
+        #: Names that are used outside of the loops that assign them.
         self._beyond_loops: Set[str] = frozenset()
-        #: What is known where the loops around the statement are left by `break`.
+        #: Known names after each `break`, for the loops around the present statement.
         self._ends: list[_Known | None] = []
-        #: Statements before the one on its way; None: part of it may not be computed.
+        #: Statements before the present one; None if its parts may not all be evaluated.
         self._before: list[Statement] | None = None
         self._depth = self._blocks = self._parts = 0
         self.has_mistakes = False
@@ -466,11 +457,11 @@ class _Builder:
     # Functions
 
     def build(self, sized: Mapping[str, Type], captured: Mapping[str, Type] | None = None) -> None:
-        """Build the tree of a function of Python.
+        """Build the tree of a Python function.
 
         Args:
-            sized: types of arguments that may be of any size.
-            captured: variables of the function around it, which are further arguments.
+            sized: types of arguments without a size.
+            captured: variables of the surrounding function, which are further arguments.
 
         """
         node = self.node
@@ -509,7 +500,7 @@ class _Builder:
         self.made.end(body)
 
     def _start(self, arguments: Mapping[str, Type]) -> None:
-        """Know the arguments, and the local functions of the function around this one."""
+        """Mark the arguments, and local functions of the surrounding function, as known."""
         self.known = {**arguments, **dict.fromkeys(self.functions, NOTHING)}
         self._variables |= {(name, type_): name for name, type_ in arguments.items()}
 
@@ -521,14 +512,14 @@ class _Builder:
             raise _Outside(node, f"* among the arguments of {node.name}: name them")
         for argument in _arguments(node):
             if argument.arg == "_":
-                raise _Outside(argument, self._foreign("an argument _"))
+                raise self._cannot(argument, "an argument _")
             if argument.annotation is None:
                 raise _Outside(argument, f"the argument {argument.arg} of {node.name} has no type")
         if node.returns is None:
             raise _Outside(node, f"the result of {node.name} has no type: write -> float")
 
     def _hinted(self, node: ast.AST, annotation: ast.expr | None, what: str) -> Type | None:
-        """The type that an annotation names; None: it has no size."""
+        """Return the type of an annotation; None for a vector or matrix without a size."""
         if annotation is None:
             raise _Follows
         try:
@@ -539,15 +530,12 @@ class _Builder:
         except Exception as error:
             if PLACED.match(str(error)):
                 raise
-            raise _Outside(node, f"{what}: {_told(error)}") from None
+            raise _Outside(node, f"{what}: {_message_of(error)}") from None
 
     # Mistakes
 
-    def _foreign(self, what: str) -> str:
-        return f"{what} is not in the language of equations{advice(what)}"
-
     def _cannot(self, node: ast.AST, what: str) -> _Outside:
-        return _Outside(node, self._foreign(what))
+        return _Outside(node, f"{what} is not in the language of equations{advice(what)}")
 
     # Blocks
 
@@ -556,7 +544,7 @@ class _Builder:
         self._blocks += 1
         for node in nodes:
             if self.known is None:
-                break  # no step of the program comes here
+                break  # unreachable
             before = len(found)
             self._before = found
             with _Noting(self, node):
@@ -582,7 +570,7 @@ class _Builder:
         getattr(self, name)(node, found)
 
     def _pass_statement(self, node: ast.Pass, found: list[Statement]) -> None:
-        """Nothing to do."""
+        """Add no statement."""
 
     def _expr_statement(self, node: ast.Expr, found: list[Statement]) -> None:
         if isinstance(getattr(node.value, "value", None), str):
@@ -629,7 +617,7 @@ class _Builder:
 
     def _assert_statement(self, node: ast.Assert, found: list[Statement]) -> None:
         test = Operation(tree.NOT, (self.condition(node.test),), BOOL)
-        # The text is made only where the condition does not hold.
+        # The text is evaluated only if the condition does not hold.
         self._before = None
         parts: list[str | tuple[Expression, str]] = ["AssertionError: "]
         if node.msg is not None:
@@ -668,7 +656,7 @@ class _Builder:
         found += orelse
 
     def _cases(self, pattern: ast.pattern) -> list[Expression]:
-        """The values of a case; none: all others."""
+        """Return the values of a case; empty for the default case."""
         if isinstance(pattern, ast.MatchAs) and pattern.pattern is None and pattern.name is None:
             return []
         if isinstance(pattern, ast.MatchOr):
@@ -686,7 +674,7 @@ class _Builder:
 
     def _while_statement(self, node: ast.While, found: list[Statement]) -> None:
         if node.orelse:
-            raise _Outside(node.orelse[0], self._foreign("else of a while"))
+            raise self._cannot(node.orelse[0], "else of a while")
         is_endless = isinstance(node.test, ast.Constant) and node.test.value == 1
         inside = [n for statement in node.body for n in ast.walk(statement)]
         if is_endless:
@@ -707,13 +695,13 @@ class _Builder:
 
     def _for_statement(self, node: ast.For, found: list[Statement]) -> None:
         if node.orelse:
-            raise _Outside(node.orelse[0], self._foreign("else of a for"))
+            raise self._cannot(node.orelse[0], "else of a for")
         self._check_target(node.target)
         changed = {*_stored(*node.body), *_names(node.target)}
         first = _first_name(node.target)
 
         def hold(value: Expression, source: ast.expr, word: str) -> Expression:
-            """Keep what the body could change, or what would be computed in each turn."""
+            """Store a value that the body could change, or that would be evaluated in each turn."""
             if word == "start" or (_is_fixed(value) and not _names(source) & changed):
                 return value
             return self._kept(value, f"{first}_{word}")
@@ -744,7 +732,7 @@ class _Builder:
     def _turn(
         self, node: ast.For | ast.comprehension, loop: _Loop, used: Set[str]
     ) -> Sequence[Statement]:
-        """The first statements in each turn of a loop: values of names that are used."""
+        """Return the first statements in each turn of a loop, which assign the names in use."""
         bound, counter = dict(loop.bound), loop.counter
         names = [name for name, value in loop.bound if value is counter]
         other = {*self._beyond_loops, *(self.known or ()), *_stored(*getattr(node, "body", ()))}
@@ -756,7 +744,7 @@ class _Builder:
             counter.name = self._unused(f"{_first_name(node.target)}_at")
         return [self._store(node, [each]) for each in bound.items() if each[0] in used]
 
-    # Functions within this one
+    # Nested functions
 
     def _functiondef_statement(self, node: ast.FunctionDef, found: list[Statement]) -> None:
         if self._counts[node.name] > (node.name not in self.made.arguments):
@@ -780,7 +768,7 @@ class _Builder:
         for name, default in defaults:
             value = self._sometimes(partial(self.fitting, wanted=types[name]), default)
             if value.fails or _names(default) & {*self.names, *self.functions}:
-                raise _Outside(default, f"the default value of {name} is no constant")
+                raise _Outside(default, f"the default value of {name} is not a constant")
             values[name] = value
         takes = _Signature("", node.name, types, len(given.posonlyargs), n, values)
         called = _Callable(inner.made, takes, captured)
@@ -788,9 +776,10 @@ class _Builder:
         self._know(node.name, NOTHING)
 
     def _captured(self, node: ast.AST, names: Sequence[str], own: Set[str]) -> list[str]:
-        """The variables that a function within this one uses, also in others that it calls."""
+        """Return the variables that a nested function uses, also in functions that it calls."""
         self._check_functions(names)
-        used = [n for name in names for n in (name, *self._captured_by(name))]
+        captured = {name: called.captured for name, called in self.functions.items()}
+        used = [n for name in names for n in (name, *captured.get(name, ()))]
         found = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
         for name in found:
             if name in own:
@@ -798,7 +787,7 @@ class _Builder:
         return found
 
     def _check_functions(self, names: Sequence[str]) -> None:
-        """Refuse local functions that may not have been defined."""
+        """Refuse local functions that may be undefined."""
         for name in names:
             if name in self.functions and not self._is_known(name):
                 raise _Outside(ast.Pass(), f"{name} may have no value here")
@@ -806,11 +795,8 @@ class _Builder:
     def _is_known(self, name: str) -> bool:
         return self.known is None or name in self.known
 
-    def _captured_by(self, name: str) -> Sequence[str]:
-        return self.functions[name].captured if name in self.functions else ()
-
     def _inner(self, word: str, own: set[str], node: ast.FunctionDef | None = None) -> _Builder:
-        """What builds a function within this one, which has names of its own."""
+        """Return the builder of a nested function."""
         made = Function(self.made.module, f"{self.made.name}_{word}", {}, sizes=self.made.sizes)
         inner = _Builder(self.program, self.path, self.scope, made, node)
         inner.functions = {
@@ -879,7 +865,7 @@ class _Builder:
         ):  # fmt: skip
             pairs = [*zip(target.elts, value.elts)]
             if _names(target) & _names(value):
-                # All are computed before the first is stored.
+                # All values are computed before the first is stored.
                 values = [
                     self._kept(self.expression(one), f"next_{i}")
                     for i, (_, one) in enumerate(pairs)
@@ -894,13 +880,13 @@ class _Builder:
                     self._assign(one, other, found)
         else:
             made_of = self.expression(value)
-            # A part that depends on what is given a value here is read before.
+            # Store the value if an assignment could change parts that are read later.
             if not _is_fixed(made_of) or _names(target) & _names(value):
                 made_of = self._kept(made_of, self._name_of_all(target, value))
             found += self._take_apart(target, made_of)
 
     def _change_of(self, target: ast.Name, value: ast.expr) -> Statement | None:
-        """The change of an element, if that is all that a name gets: no copy is needed then."""
+        """Return the change of an element if the assignment only replaces one: it needs no copy."""
         method = value.func if isinstance(value, ast.Call) else None
         is_same = (
             isinstance(method, ast.Attribute) and method.attr == "replaced"
@@ -919,7 +905,7 @@ class _Builder:
         return tree.StoreItem(target.id, [at], element)
 
     def _name_of_all(self, target: ast.expr, value: ast.expr) -> str:
-        """A name for what is taken apart: the name of the function it comes from."""
+        """Return a name for a value that is unpacked: the name of its function, or `all`."""
         name = ast.unparse(value.func).rsplit(".")[-1] if isinstance(value, ast.Call) else "all"
         return _stem(name) or "all"
 
@@ -928,7 +914,7 @@ class _Builder:
         return [self._store(target, made)] if made else []
 
     def _taken_apart(self, target: ast.expr, value: Expression) -> Iterator[tuple[str, Expression]]:
-        """The names in a target, each with its part of a value."""
+        """Yield the names in a target, each with its part of a value."""
         if isinstance(target, ast.Name):
             if target.id != "_":
                 yield target.id, value
@@ -941,7 +927,7 @@ class _Builder:
             yield from self._taken_apart(one, part)
 
     def _parts_of(self, node: ast.AST, value: Expression) -> list[Expression]:
-        """The elements of a value that has a name."""
+        """Return the elements of a value."""
         if isinstance(value.type, Array):
             return [Item(value, int_of(i)) for i in range(value.type.n)]
         if isinstance(value.type, Record):
@@ -949,7 +935,7 @@ class _Builder:
         raise _Outside(node, f"{value.type.word} is taken apart")
 
     def _store(self, node: ast.AST, values: Sequence[tuple[str, Expression]]) -> tree.Store:
-        """The statement that gives names their values, one after the other."""
+        """Return the statement that assigns values to names, in order."""
         stores = []
         for name, value in values:
             known = (self.known or {}).get(name)
@@ -971,42 +957,42 @@ class _Builder:
         return f"{name} is {before.word} and gets {value.type.word}: use another name"
 
     def _know(self, name: str, type_: Type) -> None:
-        """A name has a value from here on."""
+        """Mark a name as known from here on."""
         if self.known is not None:
             self.known = {**self.known, name: type_}
 
     def _forget(self, node: ast.AST) -> None:
-        """Names have a value from here on that has been refused."""
+        """Mark the names in a refused statement as unknown from here on."""
         for name in _stored(node):
             self._know(name, UNKNOWN)
 
     def _variable(self, name: str, type_: Type) -> str:
-        """The variable of the tree that is a name with values of a type."""
+        """Return the variable of the tree for a name with values of a type."""
         if (name, type_) not in self._variables:
             is_first = name not in self._variables.values()
             self._variables[name, type_] = name if is_first else self._unused(name)
         return self._variables[name, type_]
 
     def _unused(self, name: str) -> str:
-        """A name for the tree only, which the function has not and gets now."""
+        """Return a new name for the tree."""
         names = chain([name], (f"{name}_{number}" for number in count(2)))
         found = next(n for n in names if n not in self._taken)
         self._taken.add(found)
         return found
 
     def _held(self, value: Expression, name: str) -> Expression:
-        """A value that may be used several times: in a variable, if it is computed."""
+        """Return a value that may be used several times: a variable, if it must be computed."""
         return value if _is_fixed(value) else self._kept(value, name)
 
     def _kept(self, value: Expression, name: str) -> Expression:
-        """A value in a variable of its own."""
+        """Store a value in a new variable."""
         if self._before is None:
             raise _Outside(ast.Pass(), "this is computed only in some cases: give it a name before")
         found = self._unused(name)
         self._before.append(tree.Store([(found, value)]))
         return Local(found, value.type)
 
-    # Refusals of the component's own
+    # Exceptions that a component raises
 
     def _raise_statement(self, node: ast.Raise, found: list[Statement]) -> None:
         try:
@@ -1019,7 +1005,7 @@ class _Builder:
             raise self._cannot(node, "a raise with from")
         if not isinstance(call, ast.Call) or len(call.args) != 1 or call.keywords:
             raise self._cannot(node, "a raise without a text")
-        kind = self._meant(call.func)
+        kind = self._global_value(call.func)
         is_known = is_class(kind, BaseException) and issubclass(kind, _EXCEPTIONS)
         changed = [
             value for one in getattr(kind, "__mro__", ()) if one is not Refusal
@@ -1032,7 +1018,7 @@ class _Builder:
         return tree.Raise([head, *self._message(call.args[0])])
 
     def _message(self, text: ast.expr) -> list[str | tuple[Expression, str]]:
-        """The texts and values of a text."""
+        """Return the texts and values of a message."""
         if not isinstance(text, ast.JoinedStr):
             if not (isinstance(text, ast.Constant) and isinstance(text.value, str)):
                 raise self._cannot(text, "a raise without a text")
@@ -1046,7 +1032,7 @@ class _Builder:
         return found
 
     def _formatted(self, part: ast.FormattedValue) -> tuple[Expression, str]:
-        """A value in a text, and its format."""
+        """Return a value in a message, and its format."""
         value = self.expression(part.value)
         if part.conversion not in ((-1,) if part.format_spec else (-1, ord("s"))):
             raise _Outside(part.value, f"!{chr(part.conversion)} in a text: leave it out")
@@ -1066,13 +1052,7 @@ class _Builder:
     # Loops
 
     def _loop(self, node: ast.For | ast.comprehension, hold: _Hold) -> _Loop:
-        """What a loop goes over.
-
-        Args:
-            node: the loop.
-            hold: makes a value one that can be read in each turn.
-
-        """
+        """Return the head of a loop."""
         counter = Local("", INT)
         called, call = self._called(node.iter)
         if not call or called is not range:
@@ -1092,10 +1072,10 @@ class _Builder:
         return _Loop(counter, start, stop, step, turns, bound, is_wide)
 
     def _called(self, node: ast.expr) -> tuple[Any, ast.Call | None]:
-        return (self._meant(node.func), node) if isinstance(node, ast.Call) else (None, None)
+        return (self._global_value(node.func), node) if isinstance(node, ast.Call) else (None, None)
 
     def _bounds(self, call: ast.Call) -> list[Expression]:
-        """Where a range begins and ends, and its step."""
+        """Return the bounds and the step of a range."""
         self._check_plain(call, "range")
         if not 1 <= len(call.args) <= 3:
             raise _Outside(call, f"range with {len(call.args)} arguments")
@@ -1105,7 +1085,7 @@ class _Builder:
         return [*bounds, int_of(1)][:3]
 
     def _bound_of(self, node: ast.expr) -> Expression:
-        """A bound of a range; what consists of constants is the number that it stands for."""
+        """Return a bound of a range; an expression of constants becomes a number."""
         value = self._size(node)
         if value is None:
             return self._integer(node, "a bound of a range")
@@ -1115,7 +1095,7 @@ class _Builder:
     def _items(
         self, target: ast.expr, iterable: ast.expr, place: Expression, hold: _Hold
     ) -> tuple[list[tuple[str, Expression]], int]:
-        """Names with their values at a place, and how many places there are."""
+        """Return names with their values in a turn, and the number of turns."""
         called, call = self._called(iterable)
         if call and called in (zip, enumerate):
             return self._side_by_side(target, call, called, place, hold)
@@ -1153,7 +1133,7 @@ class _Builder:
         place: Expression,
         hold: _Hold,
     ) -> tuple[list[tuple[str, Expression]], int]:
-        """The items of `zip` and `enumerate`."""
+        """Return the names and values of `zip` and `enumerate`."""
         starts = [one for one in call.keywords if called is enumerate and one.arg == "start"]
         given = [*call.args, *(one.value for one in starts)]
         others = [one for one in call.keywords if one not in starts]
@@ -1171,7 +1151,7 @@ class _Builder:
             raise _Outside(target, "enumerate of other than two names, and a start")
         first = self._size(given[1]) if given[1:] else 0
         if first is None:
-            raise _Outside(call, "enumerate with a start that is no constant")
+            raise _Outside(call, "enumerate with a start that is not a constant")
         bound, n = self._items(names[1], given[0], place, hold)
         check_int(first)
         check_int(first + max(n - 1, 0))
@@ -1180,7 +1160,7 @@ class _Builder:
     # Expressions
 
     def expression(self, node: ast.expr, wanted: Type | None = None) -> Expression:
-        """An expression as a tree, of a type if there is a choice."""
+        """Return an expression as a tree; `wanted` is its type if several are possible."""
         name = f"_{type(node).__name__.lower()}"
         if not hasattr(self, name):
             raise self._cannot(node, word_of(node))
@@ -1194,7 +1174,7 @@ class _Builder:
                 error.node = node
             raise
         except Exception as error:
-            raise _Outside(node, _told(error)) from None
+            raise _Outside(node, _message_of(error)) from None
         finally:
             self._depth -= 1
         if found.type == UNKNOWN:
@@ -1204,11 +1184,11 @@ class _Builder:
         return found
 
     def fitting(self, node: ast.expr, wanted: Type | None) -> Expression:
-        """An expression of exactly this type."""
+        """Return an expression of exactly this type."""
         return self._fit(node, self.expression(node, wanted), wanted)
 
     def _fit(self, node: ast.AST, value: Expression, wanted: Type | None) -> Expression:
-        """The tree of an expression, if it is of exactly this type."""
+        """Return a value, if it has exactly this type, or can be converted to it."""
         value = _as_wanted(value, wanted)
         if wanted is None or value.type == wanted:
             return value
@@ -1224,7 +1204,7 @@ class _Builder:
         raise _Outside(node, f"{value.type.word} where {wanted.word} is wanted")
 
     def _number(self, node: ast.expr, value: Expression | None = None) -> Expression:
-        """An operand as a float."""
+        """Return an operand as a float."""
         if isinstance(node, ast.Constant) and type(node.value) is int:
             return Number(float(node.value), FLOAT)
         value = value or self.expression(node)
@@ -1238,14 +1218,14 @@ class _Builder:
         return Operation(tree.TO_FLOAT, (value,), FLOAT)
 
     def _integer(self, node: ast.expr, what: str) -> Expression:
-        """An expression that is an int."""
+        """Return an expression that must be an int."""
         value = self.expression(node)
         if not is_whole(value.type):
             raise _Outside(node, f"{what} that is {value.type.word}, not an int")
         return value
 
     def _sometimes(self, make: Callable[[ast.expr], Expression], node: ast.expr) -> Expression:
-        """An expression that is computed in some cases only."""
+        """Return an expression that may not be evaluated."""
         before, self._before = self._before, None
         try:
             return make(node)
@@ -1253,7 +1233,7 @@ class _Builder:
             self._before = before
 
     def _check_plain(self, node: ast.Call, word: str, n: int | None = None) -> None:
-        """Check that a call has arguments by their places only."""
+        """Check that a call has only positional arguments."""
         if node.keywords:
             raise _Outside(node, f"{word} with {node.keywords[0].arg or '**'}=")
         if any(isinstance(argument, ast.Starred) for argument in node.args):
@@ -1263,20 +1243,20 @@ class _Builder:
 
     # Names and constants
 
-    def _meant(self, node: ast.expr) -> Any:
-        """What a name of a module stands for; None: it is a local one, or an expression."""
+    def _global_value(self, node: ast.expr) -> Any:
+        """Return the value of a global name; None for a local name or an expression."""
         if isinstance(node, ast.Name) and node.id not in self.names | self.functions.keys():
             builtins: Any = self.scope.get("__builtins__", {})
             builtins = builtins if isinstance(builtins, dict) else vars(builtins)
             return self.scope.get(node.id, builtins.get(node.id))
         if isinstance(node, ast.Attribute):
-            owner = self._meant(node.value)
+            owner = self._global_value(node.value)
             if isinstance(owner, ModuleType) or is_class(owner, IntEnum):
                 return getattr(owner, node.attr, None)
         return None
 
     def _folded(self, node: ast.expr) -> float | None:
-        """The number that an expression of constants is; None: it is computed."""
+        """Return the number of an expression of constants; None for other expressions."""
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             operand = self._folded(node.operand)
             return None if operand is None else -operand
@@ -1288,16 +1268,16 @@ class _Builder:
                 return _FOLDED[type(node.op)](one, other)
             return None
         if (
-            isinstance(node, ast.Call) and self._meant(node.func) is len
+            isinstance(node, ast.Call) and self._global_value(node.func) is len
             and not any(isinstance(one, ast.Call) for x in node.args for one in ast.walk(x))
         ):  # fmt: skip
             found = self.expression(node)
             return int(found.value) if isinstance(found, Number) else None
-        value = node.value if isinstance(node, ast.Constant) else self._meant(node)
+        value = node.value if isinstance(node, ast.Constant) else self._global_value(node)
         return value if type(value) in (int, float) else None  # type: ignore[return-value]
 
     def _size(self, node: ast.expr | None) -> int | None:
-        """The int that an expression of constants is; None: it is none, or computed."""
+        """Return the int of an expression of constants; None for other expressions."""
         value = None if node is None else self._folded(node)
         return value if isinstance(value, int) else None
 
@@ -1332,12 +1312,12 @@ class _Builder:
 
     def _of_module(self, node: ast.expr) -> Expression:
         name = node.id if isinstance(node, ast.Name) else ast.unparse(node).rsplit(".")[-1]
-        value = self._meant(node)
+        value = self._global_value(node)
         if value is None:
-            shown = ast.unparse(node)
-            known = advice(f"the name {shown}")
-            raise _Outside(node, self._foreign(f"the name {shown}") if known else
-                           f"the name {shown} is not known here")  # fmt: skip
+            what = f"the name {ast.unparse(node)}"
+            if advice(what):
+                raise self._cannot(node, what)
+            raise _Outside(node, f"{what} is not known here")
         if isinstance(value, ModuleType):
             what = f"the module {value.__name__}"
             raise _Outside(node, f"{what} is not a value: name a part of it")
@@ -1345,7 +1325,7 @@ class _Builder:
             raise self._cannot(node, f"the name {ast.unparse(node)}")
         if any(value is getattr(math, one) for one in CONSTANTS):
             return Number(value, FLOAT)
-        owner = self._meant(node.value) if isinstance(node, ast.Attribute) else None
+        owner = self._global_value(node.value) if isinstance(node, ast.Attribute) else None
         module = owner.__name__ if isinstance(owner, ModuleType) else self.scope["__name__"]
         if isinstance(value, IntEnum):
             module, name = type(value).__module__, f"{type(value).__name__}_{value.name}"
@@ -1362,7 +1342,7 @@ class _Builder:
         return constants[key]
 
     def _attribute(self, node: ast.Attribute, wanted: Type | None) -> Expression:
-        owner = self._meant(node.value)
+        owner = self._global_value(node.value)
         if isinstance(owner, ModuleType) or is_class(owner, IntEnum):
             return self._of_module(node)
         value = self.expression(node.value)
@@ -1424,7 +1404,7 @@ class _Builder:
     def _sliced(
         self, node: ast.Subscript, places: ast.Slice, value: Expression
     ) -> list[Expression]:
-        """The elements of a constant slice."""
+        """Return the elements of a constant slice."""
         bounds = [places.lower, places.upper, places.step]
         numbers = [self._size(bound) for bound in bounds]
         are_known = all(n is not None or bound is None for n, bound in zip(numbers, bounds))
@@ -1454,7 +1434,7 @@ class _Builder:
         types: Sequence[Type | None],
         make: Callable[[ast.expr, Type | None], Expression] | None = None,
     ) -> list[Expression]:
-        """Expressions, of which those with a star stand for their elements."""
+        """Return expressions, with the elements of starred ones."""
         make = make or self.fitting
         values: list[Expression] = []
         for node in nodes:
@@ -1538,14 +1518,14 @@ class _Builder:
         if not is_number(operand.type):
             raise _Outside(node, f"{operand.type.word} where a number is wanted")
         if not is_minus:
-            # Of a bool it makes an int.
+            # + turns a bool into an int.
             return operand if operand.type == FLOAT else _as_int(operand)
         if is_whole(operand.type):
             return Operation(tree.INT_NEGATIVE, (operand,), INT)
         return Operation(tree.NEGATIVE, (operand,), FLOAT)
 
     def condition(self, node: ast.expr) -> Expression:
-        """An expression as a truth value."""
+        """Return an expression as a condition."""
         if isinstance(node, ast.BoolOp):
             return self._joined(node, self.condition)
         value = self.expression(node)
@@ -1596,7 +1576,7 @@ class _Builder:
             one = self._fit(node.body, one, FLOAT)
             other = self._fit(node.orelse, other, FLOAT)
         elif one.type != other.type and INT in (one.type, other.type):
-            # A member of an enumeration beside an int is one.
+            # A member of an enumeration is converted to the other value's type, int.
             one, other = self._fit(node.body, one, INT), self._fit(node.orelse, other, INT)
             return Choice(test, _as_int(one), _as_int(other))
         return Choice(test, one, self._fit(node.orelse, other, one.type))
@@ -1610,7 +1590,7 @@ class _Builder:
             return self._call_of(node, node.func.id)
         if not isinstance(node.func, (ast.Name, ast.Attribute)):
             raise self._cannot(node, word_of(node.func))
-        called = self._meant(node.func)
+        called = self._global_value(node.func)
         if called is None and isinstance(node.func, ast.Attribute):
             return self._method(node, node.func)
         if called in (Vector, Matrix, tuple):
@@ -1624,7 +1604,7 @@ class _Builder:
             return self._record(node, called)
         if is_class(called, IntEnum):
             return self._member(node, called)
-        if isinstance(called, FunctionType) and _is_at_hand(
+        if isinstance(called, FunctionType) and _is_included(
             called, self.path, self.scope["__name__"]
         ):
             return self._function(node, called)
@@ -1644,7 +1624,7 @@ class _Builder:
         return Operation(tree.MATHEMATICS[name], values, about.result)
 
     def _of_number(self, node: ast.Call, name: str) -> Expression:
-        """A call of a function that takes any number."""
+        """Return a call of a function that takes any number."""
         self._check_plain(node, name, 1)
         value = self.expression(node.args[0])
         if not is_number(value.type):
@@ -1732,7 +1712,7 @@ class _Builder:
     def _listed(
         self, node: ast.expr, make: Callable[[ast.expr, Type | None], Expression]
     ) -> list[Expression] | None:
-        """The elements of a list or a tuple, maybe some times over; None: it is neither."""
+        """Return the elements of a list or a tuple, which may be repeated; None for others."""
         times: int | None = 1
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mult):
             times, node = self._size(node.right), node.left
@@ -1745,7 +1725,7 @@ class _Builder:
         return self._elements(node.elts, (), make) * times
 
     def _collected(self, node: ast.AST, made: Any, values: Sequence[Expression]) -> Expression:
-        """A vector or a tuple of some values."""
+        """Return a vector or a tuple of values."""
         if made is tuple:
             return Make(tuple_of([value.type for value in values]), values)
         return Make(vector(len(values)), [self._in_vector(node, value) for value in values])
@@ -1771,7 +1751,7 @@ class _Builder:
     # Expressions with a for
 
     def _comprehension(self, node: ast.GeneratorExp, made: Any) -> Expression:
-        """A vector, a matrix or a tuple of what an expression gives in a loop."""
+        """Return a vector, a matrix or a tuple of the values of an expression with a `for`."""
         if node.generators[0].ifs:
             raise _Outside(node, "an if in an expression of a fixed size")
 
@@ -1807,7 +1787,7 @@ class _Builder:
         raise self._cannot(node, word_of(node))
 
     def _reduced(self, node: ast.GeneratorExp, word: str) -> Expression:
-        """What `sum`, `min`, `max`, `any` or `all` makes of an expression in a loop."""
+        """Return `sum`, `min`, `max`, `any` or `all` of an expression with a `for`."""
         each = self._in_a_loop(node)
         inner, loop = each.builder, each.loop
         if word in ("any", "all"):
@@ -1837,7 +1817,7 @@ class _Builder:
         return each.call([tree.Store([(found.name, zero)])], found)
 
     def _in_a_loop(self, node: ast.GeneratorExp) -> _Each:
-        """The function of an expression with a `for`, up to the element."""
+        """Return the unfinished function of an expression with a `for`, up to the element."""
         if len(node.generators) > 1 or node.generators[0].is_async:
             raise _Outside(node, "an expression with more than one for")
         [generator] = node.generators
@@ -1852,7 +1832,7 @@ class _Builder:
         inner._start({name: value.type for name, value in given.items()})
 
         def hold(value: Expression, source: ast.expr, word: str) -> Expression:
-            """Pass what the loop goes over."""
+            """Pass a value of the loop's head as an argument."""
             if isinstance(value, (tree.Constant, Number)):
                 return value
             name = value.name if isinstance(value, Local) else ""
@@ -1874,7 +1854,7 @@ class _Builder:
     # Methods, records and functions
 
     def _method(self, node: ast.Call, method: ast.Attribute) -> Expression:
-        if isinstance(self._meant(method.value), ModuleType):
+        if isinstance(self._global_value(method.value), ModuleType):
             return self._of_module(method)
         owner = self.expression(method.value)
         type_, name = owner.type, method.attr
@@ -1889,7 +1869,7 @@ class _Builder:
         return arrays.replaced(self.program.functions, owner, *self._replacing(node, type_))
 
     def _replacing(self, node: ast.Call, type_: Type) -> tuple[Expression, Expression]:
-        """The place and the new value of an element, as `replaced` takes them."""
+        """Return the index and the new value of an element, the arguments of `replaced`."""
         assert isinstance(type_, Array)
         place, value = node.args
         is_number = type_.item == FLOAT
@@ -1897,7 +1877,7 @@ class _Builder:
         return self.fitting(place, INT), element
 
     def _changed(self, node: ast.Call, owner: Expression) -> Expression:
-        """A record with other values of some fields."""
+        """Return a record with new values of some fields."""
         type_, owner = owner.type, self._held(owner, "all")
         assert isinstance(type_, Record)
         fields = {name: Field(owner, name, part) for name, part in type_.fields}
@@ -1912,7 +1892,7 @@ class _Builder:
         return Make(type_, [*self._given(node, takes).values()])
 
     def _member(self, node: ast.Call, made: Any) -> Expression:
-        """The member of an enumeration that an int stands for."""
+        """Return the member of an enumeration with a value."""
         self._check_plain(node, made.__name__, 1)
         type_ = enumeration(made)
         given = self.expression(node.args[0])
@@ -1934,12 +1914,14 @@ class _Builder:
                 tree.Return(Operation(tree.AS_INT, (k,), type_)),
             ]
 
-        of = self.program.functions.helper(f"{made.__name__}_of", (type_,), {"k": INT}, type_, body)
-        return Call(of, (given,))
+        name = f"{made.__name__}_of"
+        return Call(
+            self.program.functions.helper(name, (type_,), {"k": INT}, type_, body), (given,)
+        )
 
     def _function(self, node: ast.Call, called: FunctionType) -> Expression:
         hints: Mapping[str, Any] = {}
-        with suppress(Exception):  # its definition tells
+        with suppress(Exception):  # reported where it is translated
             hints = hints_of(called)
         parameters = inspect.signature(called).parameters.values()
         unsized = [one.name for one in parameters if has_no_size(hints.get(one.name))]
@@ -1969,7 +1951,7 @@ class _Builder:
         return Call(function, [*given.values()])
 
     def _call_of(self, node: ast.Call, name: str) -> Expression:
-        """A call of a local function."""
+        """Return a call of a local function."""
         if name not in self.functions:
             raise _Outside(node, f"{self._local(node, name).type.word} is called")
         self._check_functions([name])
@@ -1980,7 +1962,7 @@ class _Builder:
         return Call(called.function, [*given.values(), *captured])
 
     def _given(self, node: ast.Call, takes: _Signature) -> dict[str, Expression]:
-        """The arguments of a call, by their names, in the order of what is called."""
+        """Return the arguments of a call by name, in the order of the signature."""
         types = takes.types
         values = self._elements(node.args, [*types.values()])
         words = {str(keyword.arg): keyword.value for keyword in node.keywords}
@@ -2001,7 +1983,7 @@ class _Builder:
         return {name: found[name] for name in names}
 
     def _default(self, takes: _Signature, name: str) -> Expression:
-        """The default value of an argument."""
+        """Return the default value of an argument."""
         value, what = takes.defaults[name], f"the default value of {name}"
         if isinstance(value, Expression):
             return value
@@ -2015,7 +1997,7 @@ class _Builder:
 
 
 class _Noting:
-    """Notes what is refused within it, and goes on after it."""
+    """A context that notes a mistake and continues after it."""
 
     def __init__(self, builder: _Builder, node: ast.stmt | None = None) -> None:
         self._builder, self._node = builder, node
@@ -2024,7 +2006,7 @@ class _Noting:
         """Begin."""
 
     def __exit__(self, kind: type | None, error: BaseException | None, _: Any) -> bool:
-        """Note a refusal; what the statement would have given a value has one that is unknown."""
+        """Note a mistake; the names that the statement assigns become unknown."""
         if error is None:
             return False
         builder = self._builder
@@ -2044,7 +2026,7 @@ class _Noting:
 
 
 def _both(one: _Known | None, other: _Known | None) -> _Known | None:
-    """What has a value of one type on both ways; None: no step comes there."""
+    """Return the names known on both of two paths, with the same type; None if unreachable."""
     if one is None or other is None:
         return one if other is None else other
     types = {name: {type_, other[name]} for name, type_ in one.items() if name in other}
@@ -2056,31 +2038,31 @@ def _both(one: _Known | None, other: _Known | None) -> _Known | None:
 
 
 def _text(value: str) -> tree.Text:
-    """A text that is written out, and that C can have."""
+    """Return a literal text, if C can represent it."""
     if "\0" in value or any("\ud800" <= letter < "\ue000" for letter in value):
         raise TypeError("a text with a NUL, which ends one in C, or with half a letter")
     return tree.Text(value)
 
 
 def _first_name(target: ast.expr) -> str:
-    """The first name in a target, by which what belongs to its loop is named."""
+    """Return the first name in a target, from which names for its loop are made."""
     names = (_stem(part.id) for part in ast.walk(target) if isinstance(part, ast.Name))
     return next(filter(None, names), "x")
 
 
 def _stem(name: str) -> str:
-    """A name without what it begins with; empty: it is none then."""
+    """Return a name without leading underscores; empty if nothing remains."""
     found = name.lstrip("_")
     return found if found.isidentifier() else ""
 
 
 def _value(one: Expression) -> int | None:
-    """The int that is written out; None: it is computed."""
+    """Return the value of a literal; None for other expressions."""
     return one.value if isinstance(one, Number) else None
 
 
 def _count(first: int, place: Expression, step: int) -> Expression:
-    """The number of a range at a place."""
+    """Return the number of a range at an index."""
     found = place
     if step != 1:
         found = Operation(tree.COUNT_MULTIPLY, (place, int_of(step)), INT)
@@ -2088,7 +2070,7 @@ def _count(first: int, place: Expression, step: int) -> Expression:
 
 
 def _is_fixed(value: Expression) -> bool:
-    """Whether a value is a number, a variable or a constant, or a part of one at a known place."""
+    """Return True for a number, a variable or a constant, or a part of one at a constant index."""
     if isinstance(value, Field):
         return _is_fixed(value.owner)
     if isinstance(value, Item):
@@ -2097,19 +2079,19 @@ def _is_fixed(value: Expression) -> bool:
 
 
 def _as_wanted(value: Expression, wanted: Type | None) -> Expression:
-    """A member of an enumeration as an int, where one is wanted."""
+    """Convert a member of an enumeration if an int is wanted."""
     is_member = is_whole(value.type) and value.type != BOOL
     return _as_int(value) if wanted == INT and is_member else value
 
 
 def _as_int(value: Expression) -> Expression:
-    """A bool, or a member of an enumeration, as the int that it is."""
+    """Convert a bool, or a member of an enumeration, to an int."""
     if value.type == INT:
         return value
     return Operation(tree.AS_INT, (value,), INT)
 
 
-#: What the functions of Python that need no import make of a call.
+#: Translations of calls of built-in functions.
 _BUILT_IN: Mapping[Any, Callable[[_Builder, ast.Call], Expression]] = {
     len: _Builder._len,
     **{one: partial(_Builder._of_number, name=one.__name__)

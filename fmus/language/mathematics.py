@@ -1,7 +1,8 @@
-"""Functions of Python's `math` in the language, and when they raise.
+"""Functions of Python's `math` in the language, and the cases in which they raise.
 
-All else follows from this table: what may be called, what is called in C, which names C has taken,
-what compilers must not compute, and the list on the page of the language.
+Everything else follows from this table: the functions that may be called, their names in C, the
+reserved names, the functions that compilers must not evaluate, and the list on the page of the
+language.
 """
 
 from __future__ import annotations
@@ -12,23 +13,23 @@ from typing import NamedTuple
 
 from fmus.language.types import BOOL, FLOAT, INT, Scalar
 
-#: Raised where the result is infinite and the argument is not.
+#: An error if the result is infinite and the argument is not.
 RANGE = "range"
 
-#: Raised as arithmetic.h says.
+#: Errors that arithmetic.h implements.
 OWN = "own"
 
 
 class Function(NamedTuple):
-    """A function of floats that Python and C compute alike; it has one name in both.
+    """A function of floats with the same name and the same results in Python and C.
 
     Attributes:
-        arguments: how many it takes.
-        raises: where Python raises: RANGE, OWN, or where a condition of C holds, a domain error;
-            empty: nowhere.
-        result: its type; an int is the float that C gives, as an int.
-        is_rounded: whether the last bit is the library's, so that a compiler must not compute it.
-        factor: what a product with replaces it; 0: nothing.
+        arguments: number of arguments.
+        raises: RANGE, OWN, or a condition in C for a domain error; empty if it never raises.
+        result: type of the result; for an int, the float of C is converted.
+        is_rounded: True if the last bit depends on the library, so that a compiler must not
+            evaluate it.
+        factor: the function is a product with this factor; 0 for other functions.
 
     """
 
@@ -74,8 +75,8 @@ FUNCTIONS: Mapping[str, Function] = {
     "trunc": Function(result=INT, is_rounded=False),
 }
 
-#: Its constants.
+#: Constants of `math`.
 CONSTANTS = frozenset(("e", "inf", "nan", "pi", "tau"))
 
-#: The functions, by themselves.
+#: Names of the functions by Python's function objects.
 BY_FUNCTION = {getattr(math, name): name for name in FUNCTIONS}

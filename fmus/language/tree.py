@@ -1,12 +1,12 @@
 """Programs of the language as trees: functions of statements of typed expressions.
 
-An expression knows its type, and whether it can fail, as Python would raise. There is no exception
-in a tree: where something fails, the first failure is noted, the run of the tree goes on with any
-number, and nothing that is computed after it is used.
+An expression has a type, and a flag that is true if it can fail, which means that Python would
+raise an exception. A tree has no exceptions: the first failure is noted, the program continues with
+any number, and results after the failure are not used.
 
-Vectors, matrices, expressions with a `for` and local functions have become functions of numbers,
-elements, loops and arguments. So what writes a tree in another language needs a form for each
-class here, and for each of the operators.
+Operators of vectors and matrices, expressions with a `for` and local functions have become
+functions with elements, loops and arguments. So a translator to another language must handle only
+the classes and operators of this module.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from fmus.language.types import INT, NOTHING, TEXT, Array, Type
 
 @dataclass(frozen=True)
 class Operator:
-    """What an operation does.
+    """An operator.
 
     Attributes:
-        name: as Python has it; of ints, and of functions of `math`, with a word before it.
-        fails: whether it can.
-        function: of `math`; empty: none.
+        name: name in Python, with a prefix for ints and functions of `math`.
+        fails: True if it can fail.
+        function: name of a function of `math`; empty for other operators.
 
     """
 
@@ -36,17 +36,17 @@ class Operator:
     function: str = ""
 
 
-#: Of floats.
+#: Operators of floats.
 ADD, SUBTRACT, MULTIPLY, OVER, NEGATIVE = map(Operator, ("+", "-", "*", "/", "-x"))
 DIVIDE, FLOOR_DIVIDE, MODULO, POWER = (Operator(n, True) for n in ("x / y", "//", "%", "**"))
 
-#: Of ints, which have 32 bits.
+#: Operators of ints, which have 32 bits.
 INT_ADD, INT_SUBTRACT, INT_MULTIPLY, INT_NEGATIVE, INT_DIVIDE, INT_FLOOR_DIVIDE, INT_MODULO, \
     INT_POWER, INT_ABS = (
         Operator(f"int {n}", True) for n in ("+", "-", "*", "-x", "/", "//", "%", "**", "abs")
     )  # fmt: skip
 
-#: Of ints that have room for the result.
+#: Operators of ints whose result never exceeds 32 bits.
 COUNT_ADD, COUNT_MULTIPLY = Operator("count +"), Operator("count *")
 
 LESS, LESS_EQUAL, GREATER, GREATER_EQUAL, EQUAL, NOT_EQUAL = map(
@@ -56,45 +56,45 @@ AND, OR, NOT = map(Operator, ("and", "or", "not"))
 ABS, MIN, MAX, INT_MIN, INT_MAX = map(Operator, ("abs", "min", "max", "int min", "int max"))
 
 #: Conversions: of an int to a float, of a number to a bool, of a whole float to an int, of a float
-#: to the nearest whole one, and of a bool or a member of an enumeration to the int that it is.
+#: to the nearest whole one, and of a bool or a member of an enumeration to an int.
 TO_FLOAT, TO_BOOL, TO_INT, NEAREST, AS_INT = (
     Operator("float"), Operator("bool"), Operator("int", True), Operator("round"),
     Operator("as int"),
 )  # fmt: skip
 
-#: Functions of `math`: of an int, C has the float before it.
+#: Functions of `math`; those with an int as result give a float in C, which is then converted.
 MATHEMATICS = {
     name: Operator(f"math.{name}", bool(about.raises), name)
     for name, about in FUNCTIONS.items()
     if not about.factor
 }
 
-#: The counter of a loop that may pass the largest int, in a turn, where it does not.
+#: Converts the counter of a loop with a wide counter to an int, within the loop.
 NARROW = Operator("narrow")
 
-#: The place in an array that an int stands for, which may be below 0; the second is the length.
+#: Index into an array for an int that may be negative; the second operand is the length.
 PLACE = Operator("place", True)
 
 
 class Expression:
-    """A value: its type, and the expressions that it consists of."""
+    """A value: its type, and its operands."""
 
     type: Type
     fails: bool
 
     @cached_property
     def parts(self) -> Sequence[Expression]:
-        """In the order in which they are computed."""
+        """Operands in the order of evaluation."""
         return [*_expressions_in(vars(self).values())]
 
     def __post_init__(self) -> None:
-        """Find whether it can fail, of parts that know it."""
+        """Set the flag `fails` from the operands."""
         self.fails = any(part.fails for part in self.parts)
 
 
 @dataclass(eq=False)
 class Number(Expression):
-    """A float, an int or a bool that is written out."""
+    """A literal float, int or bool."""
 
     value: Any
     type: Type
@@ -102,7 +102,7 @@ class Number(Expression):
 
 @dataclass(eq=False)
 class Text(Expression):
-    """A text that is written out."""
+    """A literal text."""
 
     value: str
     type: Type = TEXT
@@ -118,7 +118,7 @@ class Local(Expression):
 
 @dataclass(eq=False)
 class Constant(Expression):
-    """What stands in a module: a number, or numbers."""
+    """A constant of a module: a number, or a group of numbers."""
 
     module: str
     name: str
@@ -127,7 +127,7 @@ class Constant(Expression):
 
     @cached_property
     def parts(self) -> Sequence[Expression]:
-        """There are none among its numbers, which may be many."""
+        """No operands; looking for them among many numbers would take long."""
         return ()
 
 
@@ -142,13 +142,13 @@ class Field(Expression):
 
 @dataclass(eq=False)
 class Item(Expression):
-    """An element of an array, at a place from 0 to one below its length."""
+    """An element of an array, at an index from 0 to one below its length."""
 
     owner: Expression
     place: Expression
 
     def __post_init__(self) -> None:
-        """Find its type."""
+        """Set its type."""
         assert isinstance(self.owner.type, Array)
         self.type = self.owner.type.item
         super().__post_init__()
@@ -156,7 +156,7 @@ class Item(Expression):
 
 @dataclass(eq=False)
 class Make(Expression):
-    """An array or a record of some values."""
+    """An array or a record made from values."""
 
     type: Type
     values: Sequence[Expression]
@@ -164,28 +164,28 @@ class Make(Expression):
 
 @dataclass(eq=False)
 class Operation(Expression):
-    """An operator between its operands, of which `and` and `or` compute as many as they need."""
+    """An operation; `and` and `or` evaluate only the operands that they need."""
 
     operator: Operator
     operands: Sequence[Expression]
     type: Type
 
     def __post_init__(self) -> None:
-        """Fail as the operator or an operand does."""
+        """Set the flag `fails` from the operator and the operands."""
         super().__post_init__()
         self.fails |= self.operator.fails
 
 
 @dataclass(eq=False)
 class Choice(Expression):
-    """One of two, by a condition."""
+    """One of two values, chosen by a condition."""
 
     test: Expression
     one: Expression
     other: Expression
 
     def __post_init__(self) -> None:
-        """Find its type."""
+        """Set its type."""
         self.type = self.one.type
         super().__post_init__()
 
@@ -198,7 +198,7 @@ class Call(Expression):
     arguments: Sequence[Expression]
 
     def __post_init__(self) -> None:
-        """Find its type; fail as the function or an argument does."""
+        """Set its type, and the flag `fails` from the function and the arguments."""
         self.type = self.function.returns
         super().__post_init__()
         self.fails |= self.function.fails
@@ -206,10 +206,10 @@ class Call(Expression):
 
 @dataclass
 class Statement:
-    """A step of a function.
+    """A statement of a function.
 
     Attributes:
-        comment: that stands after it in its source.
+        comment: comment on its line in the source.
 
     """
 
@@ -218,14 +218,14 @@ class Statement:
 
 @dataclass
 class Store(Statement):
-    """Values of variables, one after the other."""
+    """Assignments to variables, in order."""
 
     values: Sequence[tuple[str, Expression]]
 
 
 @dataclass
 class Reserve(Statement):
-    """A variable whose elements get their values one by one."""
+    """Declaration of a variable whose elements are assigned one by one."""
 
     name: str
     type: Type
@@ -233,7 +233,7 @@ class Reserve(Statement):
 
 @dataclass
 class StoreItem(Statement):
-    """The value of an element of a variable, or of an element of its elements."""
+    """Assignment to an element of a variable, or of a nested array."""
 
     name: str
     places: Sequence[Expression]
@@ -242,14 +242,14 @@ class StoreItem(Statement):
 
 @dataclass
 class Do(Statement):
-    """A call of what returns nothing, or whose result is not used."""
+    """A call without a result, or whose result is not used."""
 
     call: Expression
 
 
 @dataclass
 class If(Statement):
-    """One of two blocks, by a condition."""
+    """One of two blocks, chosen by a condition."""
 
     test: Expression
     body: Sequence[Statement]
@@ -258,7 +258,7 @@ class If(Statement):
 
 @dataclass
 class While(Statement):
-    """A block, as long as a condition holds and nothing has failed."""
+    """A block that is repeated while a condition holds and nothing has failed."""
 
     test: Expression
     body: Sequence[Statement]
@@ -269,10 +269,10 @@ class For(Statement):
     """A block for each number of a range; the body does not change the counter.
 
     Attributes:
-        counter: variable that has the number, in this statement only.
-        start, stop, step: of the range.
-        turns: how many there are; None: that is not known before.
-        is_wide: whether the counter may pass the largest int.
+        counter: variable with the number, known in this statement only.
+        start, stop, step: bounds and step of the range.
+        turns: number of turns; None if it is not constant.
+        is_wide: True if the counter may pass the largest int.
 
     """
 
@@ -287,24 +287,24 @@ class For(Statement):
 
 @dataclass
 class Return(Statement):
-    """The end of the function, with its result."""
+    """Return from the function, with its result."""
 
     value: Expression | None = None
 
 
 @dataclass
 class Break(Statement):
-    """The end of the innermost loop."""
+    """Leave the innermost loop."""
 
 
 @dataclass
 class Continue(Statement):
-    """The end of a turn of the innermost loop."""
+    """Continue with the next turn of the innermost loop."""
 
 
 @dataclass
 class Raise(Statement):
-    """A failure, with a text of texts and of values with their formats, and its end."""
+    """A failure, after which the function ends; its message has texts, and values with formats."""
 
     parts: Sequence[str | tuple[Expression, str]]
 
@@ -314,14 +314,14 @@ class Function:
     """A function.
 
     Attributes:
-        module, name: that it stands in, and its own; empty: one of operators or loops.
-        sizes: types that it was made for; empty: there is but one of it.
-        arguments: their types by their names.
+        module, name: its module and name; module is empty for functions of operators and loops.
+        sizes: types that it was specialised for; empty if it has only one version.
+        arguments: types of the arguments by name.
         returns: type of its result.
         body: its statements.
         doc: its docstring.
-        fails: whether it may.
-        by_address: an array among its arguments that is not copied; empty: none.
+        fails: True if it can fail.
+        by_address: an argument, which is an array, that is not copied; empty if there is none.
 
     """
 
@@ -336,12 +336,12 @@ class Function:
     by_address: str = ""
 
     def end(self, body: Sequence[Statement]) -> None:
-        """Give it its body."""
+        """Set its body, and the flag `fails`."""
         self.body, self.fails = body, any(map(may_fail, statements_in(body)))
 
 
 def statements_in(body: Sequence[Statement]) -> Iterator[Statement]:
-    """All statements of a block, also those within others."""
+    """Yield all statements of a block, including nested ones."""
     for statement in body:
         yield statement
         for block in blocks_of(statement):
@@ -349,19 +349,19 @@ def statements_in(body: Sequence[Statement]) -> Iterator[Statement]:
 
 
 def blocks_of(statement: Statement) -> Sequence[Sequence[Statement]]:
-    """The blocks that a statement has."""
+    """Return the blocks of a statement."""
     if isinstance(statement, If):
         return (statement.body, statement.orelse)
     return (statement.body,) if isinstance(statement, (While, For)) else ()
 
 
 def expressions_of(statement: Statement) -> Iterator[Expression]:
-    """The expressions of a statement, but not those of its blocks."""
+    """Yield the expressions of a statement, without its blocks."""
     yield from _expressions_in(vars(statement).values())
 
 
 def _expressions_in(values: Iterable[Any]) -> Iterator[Expression]:
-    """The expressions among the attributes of a node, also within its lists."""
+    """Yield the expressions among the attributes of a node, including lists."""
     for value in values:
         if isinstance(value, Expression):
             yield value
@@ -370,28 +370,28 @@ def _expressions_in(values: Iterable[Any]) -> Iterator[Expression]:
 
 
 def expressions_in(expression: Expression) -> Iterator[Expression]:
-    """An expression, and all that it consists of."""
+    """Yield an expression and all nested expressions."""
     yield expression
     for part in expression.parts:
         yield from expressions_in(part)
 
 
 def calls_in(body: Sequence[Statement]) -> Iterator[Call]:
-    """All calls in a block, also those within others."""
+    """Yield all calls in a block, including nested ones."""
     for statement in statements_in(body):
         for expression in expressions_of(statement):
             yield from (one for one in expressions_in(expression) if isinstance(one, Call))
 
 
 def stored_in(statement: Statement) -> list[str]:
-    """The variables that a statement gives a value, but not those of its blocks."""
+    """Return the variables that a statement assigns, without its blocks."""
     if isinstance(statement, Store):
         return [name for name, _ in statement.values]
     return [statement.name] if isinstance(statement, (Reserve, StoreItem)) else []
 
 
 def variables_in(body: Sequence[Statement]) -> dict[str, Type]:
-    """The variables that a block gives a value, with their types."""
+    """Return the variables that a block assigns, with their types."""
     found: dict[str, Type] = {}
     for one in statements_in(body):
         if isinstance(one, Store):
@@ -402,19 +402,19 @@ def variables_in(body: Sequence[Statement]) -> dict[str, Type]:
 
 
 def may_fail(statement: Statement) -> bool:
-    """Whether a statement itself may fail, or must end where something has failed."""
+    """Return True if a statement itself can fail, or must stop after a failure."""
     ends = isinstance(statement, (Raise, While))
     is_endless = isinstance(statement, For) and statement.turns is None
     return ends or is_endless or any(one.fails for one in expressions_of(statement))
 
 
 def int_of(value: int) -> Number:
-    """An int that is written out."""
+    """Return a literal int."""
     return Number(value, INT)
 
 
 class Functions(dict[Hashable, Function]):
-    """Functions by what they were made from, each after those that it calls."""
+    """Functions by their origin, each after those that it calls."""
 
     def helper(
         self,
@@ -424,7 +424,7 @@ class Functions(dict[Hashable, Function]):
         returns: Type,
         body: Callable[[], Sequence[Statement]],
     ) -> Function:
-        """A function of an operator, made once for some types."""
+        """Return the function of an operator, made once for each combination of types."""
         key = (name, *types)
         if key not in self:
             made = Function("", name, dict(arguments), returns, sizes=types)

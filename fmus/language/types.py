@@ -13,15 +13,15 @@ from typing import Any, Union, get_args, get_origin
 from auv_fmu.language.arrays import Matrix, Vector
 from fmus.ports.groups import hints_of, is_class, is_record, sizes_in, split
 
-#: How a text begins that says where it is about.
+#: The beginning of a message with a place.
 PLACED = re.compile(r".+?:\d+: ")
 
-#: A vector or matrix may be copied to the stack, which has 1 MB in Windows.
+#: Largest vector or matrix, since it may be copied to the stack, which has 1 MB on Windows.
 _MOST_NUMBERS = 65_536
 
 
 def _one(made: type) -> str:
-    """A word for a value of a class."""
+    """Return the name of a class with its article."""
     return f"{'an' if made.__name__[0] in 'AEIOUaeiou' else 'a'} {made.__name__}"
 
 
@@ -30,8 +30,8 @@ class Scalar:
     """A number, or a text of a refusal.
 
     Attributes:
-        word: what readers call it.
-        made: an enumeration; None: it is none.
+        word: its name in messages.
+        made: class of an enumeration; None for other types.
 
     """
 
@@ -41,11 +41,11 @@ class Scalar:
 
 @dataclass(frozen=True)
 class Array:
-    """A vector, a matrix, which is an array of rows, or a tuple whose elements are alike.
+    """A vector, a matrix, which is an array of rows, or a tuple of elements of one type.
 
     Attributes:
-        item, n: type of the elements, and how many there are.
-        made: Vector or Matrix; None: a tuple.
+        item, n: type and number of the elements.
+        made: Vector or Matrix; None for a tuple.
 
     """
 
@@ -55,7 +55,7 @@ class Array:
 
     @property
     def word(self) -> str:
-        """What readers call it."""
+        """Its name in messages."""
         if self.made is Matrix:
             return f"a Matrix of {self.n} rows of {sizes(self)[1]}"
         return f"a {'Vector' if self.made else 'tuple'} of {self.n}"
@@ -66,8 +66,8 @@ class Record:
     """A NamedTuple, or a tuple whose elements differ.
 
     Attributes:
-        fields: names with their types; those of a tuple are m0, m1 ...
-        made: the class; None: a tuple.
+        fields: names and types of the fields; a tuple has fields m0, m1 ...
+        made: the class; None for a tuple.
 
     """
 
@@ -76,7 +76,7 @@ class Record:
 
     @property
     def word(self) -> str:
-        """What readers call it."""
+        """Its name in messages."""
         return _one(self.made) if self.made else f"a tuple of {len(self.fields)}"
 
 
@@ -84,41 +84,41 @@ Type = Union[Scalar, Array, Record]
 
 FLOAT, INT, BOOL, TEXT, NOTHING = map(Scalar, ("a float", "an int", "a bool", "a text", "nothing"))
 
-#: Of what has been refused already.
+#: Type of an expression that has been refused.
 UNKNOWN = Scalar("unknown")
 
 _SCALARS: dict[Any, Scalar] = {float: FLOAT, int: INT, bool: BOOL, str: TEXT}
 
 
 def is_whole(type_: Type) -> bool:
-    """Whether it is an int, a bool or a member of an enumeration."""
+    """Return True for an int, a bool or an enumeration."""
     return type_ in (INT, BOOL) or (isinstance(type_, Scalar) and type_.made is not None)
 
 
 def is_number(type_: Type) -> bool:
-    """Whether one can compute with it."""
+    """Return True for a type of numbers."""
     return type_ == FLOAT or is_whole(type_)
 
 
 def is_algebraic(type_: Type) -> bool:
-    """Whether it is a vector or a matrix."""
+    """Return True for a vector or a matrix."""
     return isinstance(type_, Array) and type_.made is not None
 
 
 def sizes(type_: Type) -> tuple[int, ...]:
-    """The length of an array, or the rows and columns of a matrix."""
+    """Return the length of an array, or the rows and columns of a matrix."""
     return (type_.n, *sizes(type_.item)) if isinstance(type_, Array) else ()
 
 
 def parts_of(type_: Type) -> tuple[Type, ...]:
-    """The types of the elements of an array or a record; none of a number."""
+    """Return the types of the elements of an array or a record; empty for a number."""
     if isinstance(type_, Array):
         return (type_.item,) * type_.n
     return tuple(part for _, part in type_.fields) if isinstance(type_, Record) else ()
 
 
 def scalars_in(type_: Type) -> Iterator[Scalar]:
-    """The types of all numbers in it."""
+    """Yield the types of all numbers in a type."""
     if isinstance(type_, Scalar):
         yield type_
     for part in parts_of(type_):
@@ -127,7 +127,7 @@ def scalars_in(type_: Type) -> Iterator[Scalar]:
 
 @cache
 def count(type_: Type) -> int:
-    """How many numbers it holds."""
+    """Return the number of numbers in a type."""
     if isinstance(type_, Array):
         return type_.n * count(type_.item)
     return sum(map(count, parts_of(type_))) if isinstance(type_, Record) else 1
@@ -135,7 +135,7 @@ def count(type_: Type) -> int:
 
 @cache
 def has_only_floats(type_: Type) -> bool:
-    """Whether all numbers in it are floats."""
+    """Return True if all numbers in a type are floats."""
     if isinstance(type_, Array):
         return has_only_floats(type_.item)
     return (
@@ -144,19 +144,19 @@ def has_only_floats(type_: Type) -> bool:
 
 
 def vector(n: int) -> Array:
-    """The type of a vector."""
+    """Return the type of a vector."""
     check_size(f"a Vector of {n}", n)
     return Array(FLOAT, n, Vector)
 
 
 def matrix(rows: int, columns: int) -> Array:
-    """The type of a matrix."""
+    """Return the type of a matrix."""
     check_size(f"a Matrix of {rows} rows of {columns}", rows * columns)
     return Array(vector(columns), rows, Matrix)
 
 
 def check_size(what: str, n: int) -> None:
-    """Refuse what is empty, or larger than C takes.
+    """Refuse an array that is empty, or too large for C.
 
     Raises:
         TypeError: it is.
@@ -169,7 +169,7 @@ def check_size(what: str, n: int) -> None:
 
 
 def tuple_of(items: list[Type]) -> Array | Record:
-    """The type of a plain tuple."""
+    """Return the type of a plain tuple."""
     if TEXT in items:
         raise TypeError("a tuple of texts; choose between texts by if")
     if items and all(item == items[0] for item in items):
@@ -178,10 +178,10 @@ def tuple_of(items: list[Type]) -> Array | Record:
 
 
 def type_of(hint: Any) -> Type:
-    """The type that an annotation names.
+    """Return the type of an annotation.
 
     Raises:
-        TypeError: it is none of the language.
+        TypeError: it is not in the language.
 
     """
     hint, notes = split(hint)
@@ -206,7 +206,7 @@ def type_of(hint: Any) -> Type:
 
 
 def enumeration(made: type[IntEnum]) -> Scalar:
-    """The type of the members of an enumeration."""
+    """Return the type of an enumeration."""
     for one in made.__mro__[: made.__mro__.index(IntEnum)]:
         _check_plain(one)
     return Scalar(_one(made), made)
@@ -217,22 +217,22 @@ def _record(made: Any) -> Record:
     _check_plain(made)
     hints = hints_of(made)
     if made.__bases__[0] is not tuple or [*hints] != [*made._fields]:
-        what = f"the class {made.__name__} is no NamedTuple with a type for each field"
+        what = f"the class {made.__name__} is not a NamedTuple with a type for each field"
         raise TypeError(f"{place_of(made)}{what}")
     return Record(tuple((name, _field(made, name, hint)) for name, hint in hints.items()), made)
 
 
 def _check_plain(made: type) -> None:
-    """Refuse a class that changes what Python does with its values."""
+    """Refuse a class with special methods, which change the operators of its values."""
     for name, value in vars(made).items():
-        of = getattr(value, "__func__", value)
-        is_own = getattr(of, "__module__", "") == made.__module__ and callable(of)
+        called = getattr(value, "__func__", value)
+        is_own = getattr(called, "__module__", "") == made.__module__ and callable(called)
         if is_own and re.fullmatch(r"__\w+__|_missing_", name) and not isinstance(value, type):
             raise TypeError(f"{place_of(made)}{name} in the class {made.__name__}: leave it out")
 
 
 def _field(made: type, name: str, hint: Any) -> Type:
-    """The type of a field of a class."""
+    """Return the type of a field of a class."""
     try:
         type_ = type_of(hint)
         if type_ == TEXT:
@@ -245,7 +245,7 @@ def _field(made: type, name: str, hint: Any) -> Type:
 
 
 def place_of(made: type, field: str = "") -> str:
-    """Where a class stands, or a field of it, as the beginning of a message; empty: not known."""
+    """Return the place of a class or field, as the beginning of a message; empty if unknown."""
     try:
         lines, first = inspect.getsourcelines(made)
         path = inspect.getsourcefile(made)
@@ -256,16 +256,16 @@ def place_of(made: type, field: str = "") -> str:
 
 
 def has_no_size(hint: Any) -> bool:
-    """Whether an annotation names a vector or a matrix of any size, or a tuple with one."""
+    """Return True for a vector or a matrix without a size, or a tuple with one."""
     parts = get_args(hint) if get_origin(hint) is tuple else ()
     return hint in (Vector, Matrix) or any(map(has_no_size, parts))
 
 
 def type_of_value(value: Any, name: str) -> Type:
-    """The type of what stands in a module: numbers, or tuples of them.
+    """Return the type of a constant: a number, or a group of numbers.
 
     Raises:
-        TypeError: it is none of the language.
+        TypeError: it is not in the language.
 
     """
     if isinstance(value, Vector):
@@ -282,7 +282,7 @@ def type_of_value(value: Any, name: str) -> Type:
         return _SCALARS[type(value)]
     advice = ""
     if hasattr(value, "dtype"):
-        # numpy's numbers make numpy's of all that they meet, which divide by zero.
+        # Operations with numpy's numbers give numpy's numbers, which divide by zero.
         advice = ": write float(...) or int(...)"
     elif isinstance(value, dict):
         advice = ": write a tuple, and the place of an element for its key"
@@ -290,10 +290,10 @@ def type_of_value(value: Any, name: str) -> Type:
 
 
 def check_value(value: Any, type_: Type, name: str) -> None:
-    """Refuse what is of another type than its annotation tells.
+    """Refuse a value of another type than its annotation.
 
     Raises:
-        TypeError: it is.
+        TypeError: it has another type.
 
     """
     parts = parts_of(type_)
@@ -313,10 +313,10 @@ def check_value(value: Any, type_: Type, name: str) -> None:
 
 
 def check_int(value: int) -> None:
-    """Refuse an int that does not fit.
+    """Refuse an int of more than 32 bits.
 
     Raises:
-        TypeError: it does not.
+        TypeError: it has more.
 
     """
     if not -(2**31) <= value < 2**31:

@@ -1,11 +1,11 @@
-"""What readers call the parts of a program, and what they can write instead of some."""
+"""Names of Python's constructs in messages, and advice on replacing some of them."""
 
 from __future__ import annotations
 
 import ast
 from collections.abc import Mapping
 
-#: By the names that Python's syntax tree has for them.
+#: Names by the classes of Python's syntax tree.
 _WORDS: Mapping[str, str] = {
     "AnnAssign": "a variable without a value",
     "Assert": "assert",
@@ -57,7 +57,7 @@ _WORDS: Mapping[str, str] = {
     "YieldFrom": "yield from",
 }
 
-#: What to write instead.
+#: Advice for constructs outside the language.
 INSTEAD: Mapping[str, str] = {
     "** with other than a whole constant": "write math.pow(x, y), or sqrt(x)",
     ":=": "write the assignment on a line of its own",
@@ -119,12 +119,12 @@ INSTEAD: Mapping[str, str] = {
 
 
 def word_of(node: ast.AST) -> str:
-    """What readers call a part of a program."""
+    """Return the name of a construct."""
     name = type(node).__name__
     return _WORDS.get(name, name)
 
 
 def advice(what: str) -> str:
-    """What to write instead of something, as the end of a sentence; empty: there is no advice."""
+    """Return advice on replacing a construct, as the end of a message, or an empty text."""
     known = what.replace("the name math.", "the name ")
     return f"; {INSTEAD[known]}" if known in INSTEAD else ""

@@ -15,29 +15,29 @@ H_MAX = STEP
 
 
 class Outputs(NamedTuple):
-    """The reference, and the posture of the vehicle that makes it."""
+    """The reference, and the posture of the reference vehicle."""
 
     reference: Annotated[Reference, Variable(name="")]
     eta_d: Annotated[Vector5, Variable(ETA_WITHOUT_ROLL, "Posture of the reference vehicle")]
 
 
 def start(parameters: Parameters) -> PlannerState:
-    """State at the start."""
+    """Return the state at the start."""
     return motion_planner.initial_state(parameters.eta0, parameters.nu0)
 
 
 def derive(parameters: Parameters, state: PlannerState) -> Motion:
-    """Attitude and accelerations of the reference vehicle."""
+    """Return attitude and accelerations of the reference vehicle."""
     return motion_planner.motion(parameters.vehicle, state, parameters.tau_d)
 
 
 def update(state: PlannerState, derived: Motion, h: float) -> PlannerState:
-    """State after a step."""
+    """Return the state after a step."""
     return motion_planner.step(state, derived, h)
 
 
 def outputs(parameters: Parameters, state: PlannerState, derived: Motion) -> Outputs:
-    """The reference."""
+    """Return the reference."""
     wanted = motion_planner.reference(state, derived, parameters.ell)
     return Outputs(wanted, (*state.position, state.theta, state.psi))
 

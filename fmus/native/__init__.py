@@ -1,14 +1,16 @@
-"""The C kind of component: the same equations, as trees, in C, and the same ports, as tables.
+"""The C kind of component: the same equations, translated from trees to C, with tables of ports.
 
 ==================== ===================================================================
-module               what it states
+module               content
 ==================== ===================================================================
-:mod:`.names`        what things are called in C
+:mod:`.names`        names in C
 :mod:`.emit`         trees in C
-:mod:`.translator`   all equations of a component in C, and how the runtime calls them
+:mod:`.pieces`       pieces of C that are written around translated equations
+:mod:`.translator`   the equations of a component in C, and the functions for the runtime
+:mod:`.reducer`      indices in C
 :mod:`.tables`       the ports of a component in C
-:mod:`.packaging`    an FMU that holds libraries, and their sources
+:mod:`.packaging`    FMUs with libraries and their sources
 ==================== ===================================================================
 
-`runtime` holds what all components share: the functions of FMI and their implementation.
+`runtime` contains the C code that all components share: the functions of FMI.
 """

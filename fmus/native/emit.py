@@ -1,4 +1,4 @@
-"""Trees in C: structures, constants and functions, in the order in which they need each other."""
+"""Trees in C: structures, constants and functions, each after those that it uses."""
 
 from __future__ import annotations
 
@@ -45,7 +45,10 @@ from fmus.native.names import class_in_c, in_c, is_of_library, words_of_runtime
 LINE_WIDTH = 98
 INDENT = "    "
 
-#: How tightly the operators of C bind.
+#: Type of counters that may pass the largest int.
+_WIDE = " ".join(("long", "long"))
+
+#: Precedence of the operators of C.
 _TERNARY, _OR, _AND, _EQUALITY, _RELATION, _SUM, _PRODUCT, _UNARY, _POSTFIX = range(9)
 
 #: Operators of C between two operands.
@@ -68,16 +71,16 @@ _CALLED: dict[Operator, str] = {
     tree.INT_MIN: "smaller_int", tree.INT_MAX: "larger_int",
 }  # fmt: skip
 
-#: Spaces that no line is broken at, and what stands for a space in a text.
+#: Spaces at which no line is broken, and the sign for a space in a string.
 _UNBROKEN = re.compile(r"(?<!,) (?!(?:[-+?:]|&&|\|\|) )")
 _KEPT = "\x01"
 
-#: What stands for a space that a line is best broken at.
+#: The sign for a space at which a line is broken first.
 _BREAK = "\x02"
 
 
 def quoted(text: str) -> str:
-    """A text in C."""
+    """Return a string literal of C."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
     escaped = re.sub(r"[\x00-\x1f\x7f]", lambda found: f"\\{ord(found[0]):03o}", escaped)
     # Two question marks may begin a trigraph.
@@ -86,12 +89,12 @@ def quoted(text: str) -> str:
 
 
 def unbroken(text: str) -> str:
-    """A text in C that no line is broken in."""
+    """Return a string literal of C in which no line is broken."""
     return quoted(text).replace(" ", _KEPT)
 
 
 def lines_of(text: str, indent: str) -> list[str]:
-    """A statement as lines, which end after the commas of its outermost list if that will do."""
+    """Break a statement into lines, if possible after commas of its outermost list."""
     lines: list[str] = []
     begin = indent
     for item in text.split(_BREAK):
@@ -105,7 +108,7 @@ def lines_of(text: str, indent: str) -> list[str]:
 
 
 def _wrapped(line: str, indent: str) -> list[str]:
-    """Lines that end after commas and before operators."""
+    """Break a line after commas and before operators."""
     if len(line) <= LINE_WIDTH:
         return [line]
     text = line.lstrip()
@@ -120,46 +123,46 @@ def _wrapped(line: str, indent: str) -> list[str]:
 
 
 def _list(items: Iterable[str]) -> str:
-    """Items between commas, at which a line is broken rather than within them."""
+    """Join items by commas, at which a line is broken first."""
     return f",{_BREAK}".join(item.replace(_BREAK, " ") for item in items)
 
 
 def _call(name: str, arguments: Iterable[str], fails: bool) -> str:
-    """A call, which notes a failure in `error`."""
+    """Return a call; if it may fail, it gets `error` as its last argument."""
     return f"{name}({_list([*arguments, *(['error'] if fails else [])])})"
 
 
 def number_in_c(value: float) -> str:
-    """A number in C."""
+    """Write a number in C."""
     if isinstance(value, float):
         if isnan(value):
             return "NAN"
         if isinf(value):
             return "INFINITY" if value > 0.0 else "-INFINITY"
         return repr(float(value))
-    # The smallest int is no literal of C.
+    # C has no literal for the smallest int.
     return "(-2147483647 - 1)" if value == -(2**31) else str(int(value))
 
 
 def members(type_: Type) -> Sequence[tuple[str, Type]]:
-    """How each part of a value is written after a name, and its type."""
+    """Return the suffix in C and the type of each part of a value."""
     if isinstance(type_, Array):
         return [(f".v[{i}]", type_.item) for i in range(type_.n)]
     return [(f".{in_c(n)}", part) for n, part in type_.fields] if isinstance(type_, Record) else ()
 
 
 def strip_sphinx_marks(text: str) -> str:
-    """Take the marks that Sphinx reads out of a text."""
+    """Remove Sphinx roles and backquotes from a text."""
     return closed(re.sub(r"(?::\w+:)?`+[~.]?([^`]*)`+", r"\1", text))
 
 
 def closed(text: str) -> str:
-    """A text that does not end the comment it stands in."""
+    """Change a text so that it does not end a comment."""
     return text.replace("*/", "* /").replace("/*", "/ *")
 
 
 def _comment(text: str) -> list[str]:
-    """A docstring as a comment."""
+    """Return the lines of a docstring as a comment."""
     lines = strip_sphinx_marks(textwrap.dedent(text)).rstrip().splitlines()
     if len(lines) < 2:
         return [f"/* {line} */" for line in lines]
@@ -170,17 +173,17 @@ class Emitter:
     """Functions in C.
 
     Attributes:
-        structures, constants: their texts, by their names.
-        names: of the functions.
+        structures, constants: their definitions, by name.
+        names: names of the functions.
 
     """
 
     def __init__(self, functions: Iterable[Function], most_copied: float = inf) -> None:
-        """Begin with functions.
+        """Choose names of the functions, and define the structures that they pass.
 
         Args:
-            functions: each after those that it calls.
-            most_copied: how many numbers are passed by value; a larger structure by its address.
+            functions: functions, each after those that it calls.
+            most_copied: largest structure, in numbers, that is passed by value, not by address.
 
         """
         functions = [*functions]
@@ -194,7 +197,7 @@ class Emitter:
         self._types: dict[Type | tuple[str, int], str] = {}
         self._constants: dict[tree.Constant, str] = {}
         self._wrappers: dict[str, str] = {}
-        #: Names of variables, which nothing else has.
+        #: Names of variables, which nothing else may have.
         self._variables = {in_c(name) for one in functions for name in _variables(one)}
         #: Names of structures, functions and constants, and of functions of `math` that raise.
         self._taken = {f"math_{name}" for name in FUNCTIONS}
@@ -204,13 +207,13 @@ class Emitter:
         self.names = {one: self._in_module(one.module, one.name, *one.sizes) for one in functions}
 
     def text(self) -> str:
-        """All of it."""
+        """Return all definitions."""
         functions = [_Definition(self, function).text() for function in self.names]
         parts = [*self.structures.values(), *self.constants.values(), *self._wrappers.values()]
         return "\n\n".join([*parts, *functions])
 
     def call(self, function: Function, arguments: Sequence[str]) -> str:
-        """A call, in a function that has an `error` where this one needs it."""
+        """Return a call in a function that has an argument `error` if it is needed."""
         addressed = self.addressed(function)
         given = [
             f"&{text}" if name in addressed else text
@@ -219,17 +222,17 @@ class Emitter:
         return _call(self.names[function], given, function.fails)
 
     def addressed(self, function: Function) -> frozenset[str]:
-        """The arguments of a function that are passed by their addresses."""
+        """Return the arguments of a function that are passed by address."""
         return self._addressed[function]
 
     def shared(self, function: Function) -> frozenset[str]:
-        """These arguments, and the variables that are parts of them, which are not copied."""
+        """Return these arguments and the variables that point into them, which are not copied."""
         return self._shared[function]
 
     # Names
 
     def unused(self, name: str) -> str:
-        """A name that no other structure, function or constant has."""
+        """Return a name that no other structure, function or constant has."""
         name += "_" if is_of_library(name) else ""
         while name in self._taken or name in self._variables or name in words_of_runtime():
             name += "_"
@@ -237,7 +240,7 @@ class Emitter:
         return name
 
     def _in_module(self, module: str, name: str, *sizes: Type) -> str:
-        """A name for what stands in a module."""
+        """Return a name for a function or constant of a module."""
         stems = (part.lstrip("_") for part in (module.rpartition(".")[2], name))
         parts = [*stems, *map(self.type, sizes)]
         found = re.sub(r"\W+", "_", "_".join(filter(None, parts)))
@@ -246,24 +249,24 @@ class Emitter:
     # Types and constants
 
     def type(self, type_: Type) -> str:
-        """The type, whose structures are defined."""
+        """Return the name of a type, and define its structures."""
         if isinstance(type_, Scalar):
             if is_whole(type_):
                 return "int"
             return {FLOAT: "double", TEXT: "const char *"}.get(type_, "void")
-        # Arrays that are alike in C are one structure.
+        # Arrays with the same type in C share one structure.
         key = (self.type(type_.item), type_.n) if isinstance(type_, Array) else type_
         if key not in self._types:
             self._types[key] = self._structure(type_)
         return self._types[key]
 
     def declared(self, type_: Type) -> str:
-        """A type before a name."""
+        """Return a type for a declaration, with a space if one is needed before the name."""
         name = self.type(type_)
         return name if name.endswith("*") else f"{name} "
 
     def _structure(self, type_: Array | Record) -> str:
-        """The name of a structure, which is defined after those that it needs."""
+        """Define a structure, after the structures in it, and return its name."""
         doc = ""
         if isinstance(type_, Array):
             item, n = self.type(type_.item), type_.n
@@ -290,7 +293,7 @@ class Emitter:
         return name
 
     def constant(self, one: tree.Constant) -> str:
-        """The name of a constant, which is defined."""
+        """Define a constant, and return its name."""
         if one not in self._constants:
             name = self._constants[one] = self._in_module(one.module, one.name)
             value = f"{self.declared(one.type)}{name} = {self._literal(one.value, one.type)}"
@@ -298,14 +301,14 @@ class Emitter:
         return self._constants[one]
 
     def _literal(self, value: Any, type_: Type) -> str:
-        """A value as an initializer."""
+        """Return the initializer of a value."""
         if isinstance(type_, Scalar):
             return number_in_c(value)
         parts = _list(self._literal(one, part) for one, (_, part) in zip(value, members(type_)))
         return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
 
     def wrap(self, name: str) -> None:
-        """Define a function of `math` that raises as Python's does."""
+        """Define a function of `math` that fails in the same cases as Python's."""
         raises = FUNCTIONS[name].raises
         if raises == OWN:
             return
@@ -319,7 +322,7 @@ class Emitter:
 
 
 class _Definition:
-    """A function on its way to C."""
+    """The translation of one function."""
 
     def __init__(self, emitter: Emitter, function: Function) -> None:
         self._emitter, self._function = emitter, function
@@ -327,7 +330,7 @@ class _Definition:
         self._parts = self._addressed - emitter.addressed(function)
 
     def text(self) -> str:
-        """All of it."""
+        """Return the definition of the function."""
         emitter, function = self._emitter, self._function
         given = [
             f"const {emitter.type(type_)} *{in_c(name)}"
@@ -346,14 +349,14 @@ class _Definition:
     # Expressions
 
     def expression(self, one: Expression, within: int = _TERNARY) -> str:
-        """An expression as an operand of what binds so tightly."""
+        """Return an expression, in brackets if the context has a higher precedence."""
         text, binding = self._bound(one)
         if binding != _POSTFIX:
             text = text.replace(_BREAK, " ")
         return text if binding >= within else f"({text})"
 
     def _bound(self, one: Expression) -> tuple[str, int]:  # noqa: PLR0911, for each class
-        """An expression, and how tightly its outermost operator binds."""
+        """Return an expression and the precedence of its outermost operator."""
         if isinstance(one, Number):
             text = number_in_c(one.value)
             return text, _UNARY if text.startswith("-") else _POSTFIX
@@ -385,7 +388,7 @@ class _Definition:
         return self._operation(one)
 
     def _address(self, one: Expression) -> str:
-        """The address of a value."""
+        """Return the address of a value."""
         if isinstance(one, Local) and one.name in self._addressed:
             return in_c(one.name)
         root = one
@@ -396,23 +399,23 @@ class _Definition:
         return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}"
 
     def _member(self, one: Expression) -> str:
-        """A structure, with the sign before a member of it."""
+        """Return a structure with the operator for access to a member."""
         if isinstance(one, Local) and one.name in self._addressed:
             return f"{in_c(one.name)}->"
         return f"{self.expression(one, _POSTFIX)}."
 
     def _owner(self, one: Expression) -> str:
-        """An array, with the sign before a member of it."""
+        """Return an array with the operator for access to a member."""
         root = one
         while isinstance(root, Field):
             root = root.owner
         if not isinstance(root, (Call, Choice)):
             return self._member(one)
-        # In C99, what comes from a function or a choice may end before an element of it is read.
+        # In C99, the lifetime of a result may end before its element is read.
         return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}->"
 
     def _initial(self, one: Expression) -> str:
-        """A value where what is around it tells its type."""
+        """Return a value in a context that determines its type."""
         if not isinstance(one, Make):
             return self.expression(one)
         texts = [self._initial(part) for part in one.parts]
@@ -423,7 +426,7 @@ class _Definition:
 
     def _mathematics(self, one: Operation, op: Operator) -> tuple[str, int]:
         texts = [self.expression(part) for part in one.operands]
-        # A macro takes the commas of a structure for its own.
+        # A macro would take the commas of a structure for its own.
         if any(isinstance(part, Make) for each in one.parts for part in tree.expressions_in(each)):
             texts = [f"({text})" for text in texts]
         if op.fails:
@@ -438,7 +441,7 @@ class _Definition:
             return self._mathematics(one, op)
         if op in _INFIX:
             sign, binding = _INFIX[op]
-            # Compilers want brackets around a comparison within another one.
+            # Compilers warn of a comparison in another one without brackets.
             both = (_SUM, _SUM) if binding < _SUM else (binding, binding + 1)
             left, right = (self.expression(*each) for each in zip(one.parts, both))
             return f"{left} {sign} {right}", binding
@@ -446,7 +449,7 @@ class _Definition:
             return _call(_CALLED[op], map(self.expression, one.parts), op.fails), _POSTFIX
         if op in (tree.AND, tree.OR):
             sign, binding = (" || ", _OR) if op == tree.OR else (" && ", _AND)
-            # Compilers want brackets around one kind of them within the other.
+            # Compilers warn of && in || without brackets.
             return sign.join(self.expression(p, _EQUALITY) for p in one.parts), binding
         [part] = one.parts
         if op == tree.AS_INT:
@@ -462,7 +465,7 @@ class _Definition:
     # Statements
 
     def _block(self, statements: Sequence[Statement], known: set[str], indent: str) -> list[str]:
-        """A block; variables are declared where the first statement of it needs them."""
+        """Return a block; variables are declared before the first statement that uses them."""
         used: dict[str, list[int]] = {}
         for i, statement in enumerate(statements):
             for name in dict.fromkeys(_used(statement)):
@@ -487,7 +490,7 @@ class _Definition:
         return lines
 
     def _zero(self, name: str, type_: Type) -> str:
-        """The declaration of a variable that gets its value in a block below."""
+        """Return the declaration of a variable that gets its value in a nested block."""
         value = "0.0" if type_ == FLOAT else "0" if isinstance(type_, Scalar) else "{0}"
         return f"{self._emitter.declared(type_)}{in_c(name)} = {value};"
 
@@ -536,7 +539,7 @@ class _Definition:
             yield f"{indent}}}"
 
     def _head(self, one: tree.While | tree.For) -> str:
-        """The first line of a loop, which ends after an error that it could not end by itself."""
+        """Return the first line of a loop, which also tests for errors in its body."""
         if isinstance(one, tree.While):
             return f"while (!error->raised && {self.expression(one.test, _AND)})"
         fails = one.turns is None or any(map(tree.may_fail, tree.statements_in(one.body)))
@@ -544,13 +547,13 @@ class _Definition:
         test = f"{name} {sign} {self.expression(one.stop, _SUM)}"
         test = f"!error->raised && {test}" if fails else test
         change = {1: f"{name}++", -1: f"{name}--"}.get(one.step, f"{name} += {one.step}")
-        kind = "long long" if one.is_wide else "int"
+        kind = _WIDE if one.is_wide else "int"
         return f"for ({kind} {name} = {self.expression(one.start)}; {test}; {change})"
 
     def _stored(
         self, one: tree.Store, new: Sequence[str], stores: Counter[str], indent: str
     ) -> Iterator[str]:
-        """The values of variables; those of one type that are new are declared together."""
+        """Yield assignments; new variables of one type are declared together."""
 
         def alike(value: tuple[str, Expression]) -> tuple[Any, ...]:
             name, made = value
@@ -584,7 +587,7 @@ class _Definition:
         yield from lines_of(text, indent)
 
     def _left(self) -> str:
-        """The statement that ends the function after an error."""
+        """Return the statement that leaves the function after an error."""
         returns = self._function.returns
         if returns == NOTHING:
             return "return;"
@@ -603,12 +606,11 @@ class _Definition:
                 text = f'{self.expression(value, _OR)} ? "True" : "False"'
             form += f"%{how}" if how else "%s"
             arguments.append(text)
-        told = quoted(form).replace(" ", _KEPT)
-        return f"raise_error({_list(['error', told, *arguments])});"
+        return f"raise_error({_list(['error', unbroken(form), *arguments])});"
 
 
 def _addressed(function: Function, most_copied: float) -> frozenset[str]:
-    """The arguments of a function that are passed by their addresses: it does not change them."""
+    """Return the arguments that are passed by address: large ones that are not changed."""
     stored = {name for one in tree.statements_in(function.body) for name in tree.stored_in(one)}
     large = {name for name, type_ in function.arguments.items() if count(type_) > most_copied}
     return frozenset({function.by_address} | (large - stored)) - {""}
@@ -617,7 +619,7 @@ def _addressed(function: Function, most_copied: float) -> frozenset[str]:
 def _large_parts(
     function: Function, addressed: frozenset[str], most_copied: float
 ) -> frozenset[str]:
-    """The variables that are large parts of such arguments: addresses, too."""
+    """Return the variables that are large parts of such arguments: pointers, too."""
     stores, found = Counter(_stores(function.body)), {*addressed}
     for one in function.body:
         for name, value in one.values if isinstance(one, tree.Store) else ():
@@ -632,7 +634,7 @@ def _large_parts(
 
 
 def _ends(body: Sequence[Statement]) -> bool:
-    """Whether each way through a block ends the function."""
+    """Return True if every path through a block leaves the function."""
     last = body[-1] if body else None
     while isinstance(last, tree.If) and _ends(last.body):
         last = last.orelse[-1] if last.orelse else None
@@ -640,7 +642,7 @@ def _ends(body: Sequence[Statement]) -> bool:
 
 
 def _chain(one: tree.If) -> tuple[list[tree.If], Sequence[Statement]]:
-    """A choice, and those that are all of what the one before does else; what the last one does."""
+    """Return an if with its chain of elifs, and the block of the final else."""
     found, orelse = [one], one.orelse
     while len(orelse) == 1 and isinstance(orelse[0], tree.If) and not orelse[0].comment:
         found.append(orelse[0])
@@ -649,7 +651,7 @@ def _chain(one: tree.If) -> tuple[list[tree.If], Sequence[Statement]]:
 
 
 def _used(one: Statement, deep: bool = True) -> Iterator[str]:
-    """The variables that a statement uses or gives a value, with those of its blocks or without."""
+    """Yield the variables that a statement uses or assigns; if `deep`, also in its blocks."""
     rest = [(one, frozenset[str]())]
     while rest:
         one, counters = rest.pop()
@@ -663,13 +665,13 @@ def _used(one: Statement, deep: bool = True) -> Iterator[str]:
 
 
 def _stores(statements: Sequence[Statement]) -> Iterator[str]:
-    """The variables that are given a value, each time; those of an element twice."""
+    """Yield the variables that are assigned, each time; twice for changes of elements."""
     for one in tree.statements_in(statements):
         yield from tree.stored_in(one) * (1 + isinstance(one, (tree.StoreItem, tree.Reserve)))
 
 
 def _variables(function: Function) -> Iterator[str]:
-    """The names of all arguments and variables of a function."""
+    """Yield the names of all arguments and variables of a function."""
     yield from function.arguments
     for one in tree.statements_in(function.body):
         yield from tree.stored_in(one)
@@ -678,7 +680,7 @@ def _variables(function: Function) -> Iterator[str]:
 
 
 def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
-    """Lines with a comment at the end, or before them."""
+    """Add a comment at the end of a line, or before the lines."""
     if len(lines) == 1 and len(lines[0]) + 1 + len(comment) <= LINE_WIDTH:
         return [f"{lines[0]} {comment}"]
     return [f"{indent}{comment}", *lines]
@@ -686,12 +688,12 @@ def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
 
 @cache
 def _comments(made: Any) -> dict[str, str]:
-    """What `#:` says of the fields of a class, as comments."""
+    """Return the `#:` comments of the fields of a class, as comments of C."""
     if made is None:
         return {}
     try:
         text = inspect.getsource(made)
     except OSError:
-        return {}  # it was not written as a class
+        return {}  # made without a class statement
     found = re.findall(r"^    (\w+):.*#: (.*)$", text, re.MULTILINE)
     return {name: f" /* {strip_sphinx_marks(text)} */" for name, text in found}

@@ -1,4 +1,4 @@
-"""The native kind: an FMU that holds libraries, and their sources in C."""
+"""The native kind: FMUs with libraries and their sources in C."""
 
 from __future__ import annotations
 
@@ -16,18 +16,21 @@ from fmus.native.emit import quoted
 from fmus.native.names import RUNTIME
 from fmus.native.tables import tables
 from fmus.native.translator import translated
-from fmus.ports import description, description_fmi3
 from fmus.ports.definition import Definition, Model
-from orchestrator.machine.compilers import Compiler, library
-from orchestrator.machine.platforms import Platform
+from fmus.ports.description import (
+    SOURCES,
+    fmi2_description,
+    fmi3_build_description,
+    fmi3_description,
+    variables_of,
+)
+from fmus.ports.terminals import terminals_of
+from orchestrator.machine.compilers import Compiler, Platform, library
 
 _FOLDER = Path(__file__).parent
 
-#: The file to compile, by the version of FMI: it includes all others.
-MAIN: dict[str, str] = dict(zip(FMI_VERSIONS, (description.SOURCE, description_fmi3.SOURCE)))
-
 _IDENTITY = """\
-/* Which FMU this is. */
+/* The name and GUID of this FMU. */
 #ifndef IDENTITY_H
 #define IDENTITY_H
 
@@ -38,21 +41,15 @@ _IDENTITY = """\
 """
 
 
-def _described(model: Model, guid: str, fmi: str, arrays: bool) -> bytes:
-    if fmi == FMI_VERSIONS[0]:
-        return description.fmi2_description(model, guid)
-    return description_fmi3.fmi3_description(model, guid, arrays)
-
-
 class Parts(NamedTuple):
-    """What a native FMU is made of.
+    """Parts of a native FMU.
 
     Attributes:
-        model: what its description says.
+        model: content of its description.
         equations, tables: the files equations.c and ports.h.
-        documents: what it holds for its user, by the places in it.
-        terminals: of FMI 3.0, the file terminalsAndIcons.xml.
-        arrays: whether vectors and matrices of one unit are variables of FMI 3.0.
+        documents: documentation and reference results, by their paths in the FMU.
+        terminals: the file terminalsAndIcons.xml of FMI 3.0.
+        arrays: True if vectors and matrices of one unit are array variables of FMI 3.0.
 
     """
 
@@ -65,11 +62,11 @@ class Parts(NamedTuple):
 
 
 def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
-    """What a version of FMI has besides, nearly all of it to be drawn."""
+    """Return icons, and for FMI 3.0 the build description and terminals."""
     icon = documentation.ICON.read_bytes()
     if fmi == FMI_VERSIONS[0]:
         return {"model.png": icon}
-    build = description_fmi3.fmi3_build_description(parts.model.identifier)
+    build = fmi3_build_description(parts.model.identifier)
     return {
         "sources/buildDescription.xml": build,
         "terminalsAndIcons/terminalsAndIcons.xml": parts.terminals,
@@ -81,13 +78,13 @@ def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
 def sources(
     definition: Definition, fmi: str = FMI_VERSIONS[0], arrays: bool = False
 ) -> dict[str, str]:
-    """The C sources of a component by their names, all but identity.h."""
+    """Return the C sources of a component by their file names, except identity.h."""
     return sources_of(translated(definition), tables(definition, arrays), fmi)
 
 
 def sources_of(equations: str, ports: str, fmi: str) -> dict[str, str]:
-    """The C sources of a version of FMI by their names, with equations.c and ports.h."""
-    others = {name for version, name in MAIN.items() if version != fmi}
+    """Return the C sources for a version of FMI by their file names, except identity.h."""
+    others = {name for version, name in SOURCES.items() if version != fmi}
     return {
         **{
             path.name: path.read_text(encoding="utf-8")
@@ -104,18 +101,10 @@ def fmu_entries(
     fmi: str,
     platforms: Sequence[Platform],
     compiler: Compiler,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
     arrays: bool = False,
 ) -> dict[str, bytes]:
-    """The contents of the FMU of a component.
-
-    Args:
-        source: of the component.
-        fmi: version.
-        platforms: that it has libraries for.
-        compiler: that makes them.
-        tell: called with a line when a library is made.
-        arrays: whether vectors and matrices of one unit are variables of FMI 3.0.
+    """Return the contents of the FMU of a component; `report` gets a line for each library.
 
     Raises:
         OSError: the compiler fails.
@@ -124,17 +113,17 @@ def fmu_entries(
     definition = source.definition
     documents = documentation.fmu_documents(source, NATIVE, fmi)
     if arrays:
-        # The reference results that it would carry are of scalars.
+        # The reference results are for scalar variables.
         documents = {name: text for name, text in documents.items() if name.endswith(".html")}
     parts = Parts(
         definition,
         translated(definition),
         tables(definition, arrays),
         documents,
-        description_fmi3.terminals_and_icons(definition.ports, arrays),
+        terminals_of({"": [one.port for one in variables_of(definition.ports, arrays)]}),
         arrays,
     )
-    return entries_of(parts, fmi, platforms, compiler, tell)
+    return entries_of(parts, fmi, platforms, compiler, report)
 
 
 def entries_of(
@@ -142,36 +131,31 @@ def entries_of(
     fmi: str,
     platforms: Sequence[Platform],
     compiler: Compiler,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> dict[str, bytes]:
-    """The contents of an FMU.
+    """Return the contents of an FMU; `report` gets a line for each library.
 
     Its GUID follows from its description and its sources, and is the same for all platforms.
-
-    Args:
-        parts: that it is made of.
-        fmi: version.
-        platforms: that it has libraries for.
-        compiler: that makes them.
-        tell: called with a line when a library is made.
 
     Raises:
         OSError: the compiler fails.
 
     """
     model, name = parts.model, parts.model.identifier
-    describe = partial(_described, model, fmi=fmi, arrays=parts.arrays)
+    describe: Callable[[Model, str], bytes] = fmi2_description
+    if fmi == "3":
+        describe = partial(fmi3_description, arrays=parts.arrays)
     texts = sources_of(parts.equations, parts.tables, fmi)
     written = {name: text.encode() for name, text in texts.items()}
-    guid = guid_of(digest_of({**written, "modelDescription.xml": describe("")}))
+    guid = guid_of(digest_of({**written, "modelDescription.xml": describe(model, "")}))
     written["identity.h"] = _IDENTITY.format(name=quoted(model.name), guid=guid).encode()
     libraries = {}
     for platform in platforms:
         path = f"binaries/{platform.name}/{name}{platform.ending}"
-        libraries[path] = library(compiler, platform, name, written, MAIN[fmi])
-        tell(f"{model.name} for {platform.name}, FMI {fmi}.0")
+        libraries[path] = library(compiler, platform, name, written, SOURCES[fmi])
+        report(f"{model.name} for {platform.name}, FMI {fmi}.0")
     return {
-        "modelDescription.xml": describe(guid),
+        "modelDescription.xml": describe(model, guid),
         **_pictures(parts, fmi),
         **parts.documents,
         "documentation/licenses/license.txt": licences(NATIVE).encode(),
@@ -182,20 +166,20 @@ def entries_of(
 
 @dataclass(frozen=True)
 class NativeKind:
-    """The native kind, for some platforms; a line tells of each library that is made."""
+    """The native kind for some platforms; `report` gets a line for each compiled library."""
 
     fmi: str
     platforms: Sequence[Platform]
     compiler: Compiler
-    tell: Callable[[str], None]
+    report: Callable[[str], None]
     arrays: bool = False
     name = NATIVE
-    #: How many are written at the same time: compilers are processes of their own.
+    #: Number of FMUs that are written in parallel: compilers are separate processes.
     side_by_side = os.cpu_count()
 
     @property
     def settings(self) -> dict[str, str]:
-        """What the FMUs depend on besides their sources."""
+        """Settings that the FMUs depend on in addition to their sources."""
         return {
             "kind": NATIVE,
             "fmi": self.fmi,
@@ -212,6 +196,6 @@ class NativeKind:
 
         """
         entries = fmu_entries(
-            source, self.fmi, self.platforms, self.compiler, self.tell, self.arrays
+            source, self.fmi, self.platforms, self.compiler, self.report, self.arrays
         )
         write_archive(path, entries)

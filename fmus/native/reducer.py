@@ -1,4 +1,4 @@
-"""Indices in C: what takes a row after the other, and gives numbers at the end."""
+"""Indices in C: functions that process rows one by one, and return numbers at the end."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fmus.native.pieces import function, initializer, scalars, structure
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer
 
-#: Where a row has the value of a port, as an expression in C.
+#: Returns the expression in C of a port's value in a row.
 Source = Callable[[Port], str]
 
 
@@ -21,11 +21,11 @@ class ReducerText:
     """An index in C.
 
     Attributes:
-        reducer: what it says.
-        program: with its hooks as trees.
-        emitter: of all equations.
-        name: of its structure, and what its functions begin with.
-        is_alone: whether rows are taken at one place only, where that may stand.
+        reducer: its hooks and results.
+        program: trees of its hooks.
+        emitter: emitter of all equations.
+        name: name of its structure, and prefix of its functions.
+        is_alone: True if rows are processed at one place only, so that the function may be inlined.
 
     """
 
@@ -36,14 +36,14 @@ class ReducerText:
     is_alone: bool = False
 
     def structure(self) -> str:
-        """Its structure."""
+        """Write its structure."""
         state, row = map(self._type, (self.reducer.state, self.reducer.inputs))
         before = [f"{row} before; /* the last row */"] * self._looks_back
-        rows = ["int begun; /* -1: it has raised */", f"{state} state;", *before]
+        rows = ["int begun; /* -1: a hook has failed */", f"{state} state;", *before]
         return structure(self.name, rows)
 
     def text(self) -> Iterator[str]:
-        """What takes a row, and what gives its numbers."""
+        """Yield the functions that process a row and return the numbers."""
         row, found = self._type(self.reducer.inputs), self._type(self.reducer.outputs)
         start, update = self._call("start"), self._call("update", state="it->state")
         lines = [
@@ -77,7 +77,7 @@ class ReducerText:
             f"const {found} all = {self._call('outputs', state='it->state')};",
             *(f"found[{i}] = {text};" for i, text in enumerate(numbers)),
         ]
-        yield "/* Gives the numbers, which are none before the first row. */\n" + function(
+        yield "/* Returns the numbers, which are NaN before the first row. */\n" + function(
             f"APART void {self.name}_give(const {self.name} *it, double t, double begin,\n"
             "                 double end, double found[], Error *error)",
             lines,
@@ -85,24 +85,24 @@ class ReducerText:
         )
 
     def over_rows(self) -> str:
-        """What takes rows of any run: which columns it takes, the caller says."""
+        """Write functions that process rows of any run; callers pass the numbers of columns."""
         places = {port.name: k for k, port in enumerate(self.reducer.ports)}
         row = self.row(lambda port: _PLACE.format(places[port.name]))
         return _ROWS.format(name=self.name, row=row)
 
     def over_run(self) -> str:
-        """What gives the numbers of a run whose rows are all there."""
+        """Write functions that also reduce a finished run."""
         last = self.reducer.last
         since = "-INFINITY" if last is None else f"rows[(n - 1) * width] - {number_in_c(last)}"
         return f"{self.over_rows()}\n{_RUN.format(since=since)}"
 
     @property
     def _looks_back(self) -> bool:
-        """Whether it takes the row before."""
+        """True if it needs the row before."""
         return not {"before", "acting"}.isdisjoint(self.reducer.arguments("update"))
 
     def row(self, source: Source) -> str:
-        """A row, whose numbers come from a source."""
+        """Return the expression of a row from the expressions of its numbers."""
         places = map(source, self.reducer.ports)
         type_ = type_of(self.reducer.inputs)
         return f"({self.emitter.type(type_)}){initializer(type_, places)}"
@@ -116,37 +116,37 @@ class ReducerText:
 
 
 _ROWS = """\
-/* What is kept of rows that come in blocks, and when the last one was [s]. */
+/* The state between blocks of rows, and the time of the last row [s]. */
 typedef struct {{
     {name} of;
     double time;
-    Error error;
+    Error failure;
 }} kept;
 
 EXPORTED size_t size_of_rows(void) {{ return sizeof(kept); }}
 
-/* Takes n rows of a width; how many were taken before one raised. */
+/* Processes n rows of a width; returns the number of rows before a failure. */
 EXPORTED int take_rows(kept *it, const double rows[], int n, int width, const int from[],
                        const double constants[], int acts_at_end, double begin, double end) {{
     for (int k = 0; k < n; k++, rows += width) {{
         const double t = rows[0], h = t - it->time;
         {name}_look(&it->of, {row},
-            acts_at_end, t, h, begin, end, &it->error);
-        if (it->error.raised) return k;
+            acts_at_end, t, h, begin, end, &it->failure);
+        if (it->failure.raised) return k;
         it->time = t;
     }}
     return n;
 }}
 
-/* Gives the numbers; whether that raised. */
+/* Returns true if a hook has failed. */
 EXPORTED int give_numbers(kept *it, double begin, double end, double found[]) {{
-    {name}_give(&it->of, it->time, begin, end, found, &it->error);
-    return it->error.raised;
+    {name}_give(&it->of, it->time, begin, end, found, &it->failure);
+    return it->failure.raised;
 }}
 """
 
 _RUN = """\
-/* Gives the numbers of n rows; whether something has raised. */
+/* Reduces n rows; returns true if a hook has failed. */
 EXPORTED int reduce(const double rows[], int n, int width, const int from[],
                     const double constants[], int acts_at_end, double begin, double end,
                     double found[]) {{
@@ -159,16 +159,18 @@ EXPORTED int reduce(const double rows[], int n, int width, const int from[],
 }}
 """
 
-#: A value of a row, or one that never changes.
+#: The expression of a value in a row, or of a constant.
 _PLACE = "from[{0}] < 0 ? constants[{0}] : rows[from[{0}]]"
 
-_WHY = "EXPORTED const char *why(const kept *it) { return it->error.why.text; }\n"
+_WHY = "EXPORTED const char *why(const kept *it) { return it->failure.why.text; }\n"
 
 
 def text_over_rows(reducer: Reducer) -> str | None:
-    """An index in C over rows of any run, as a source of its own.
+    """Translate an index to a C source that processes rows of any run.
 
-    None: it is outside the language of equations.
+    Returns:
+        The source; None if the index is outside the language of equations.
+
     """
     program = Program(*reducer.hooks.values())
     if program.mistakes:

@@ -1,4 +1,4 @@
-"""The ports of a component in C, as tables, and what the numbers of its state are."""
+"""The ports of a component in C, as tables, and the types of its state's numbers."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from auv_fmu.paper import euler
 from fmus.language.types import Record, Type, type_of
 from fmus.native.emit import members, quoted
 from fmus.ports.definition import Definition
-from fmus.ports.description_fmi3 import variables_of
+from fmus.ports.description import variables_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, Port
 
 _HEAD = f"""\
-/* The ports: a value reference is a place in the first table.
+/* The ports; the index in the first table follows from the value reference.
  *
- * Made from the declaration of the ports. The columns are name, type, causality, variability,
- * place of the value, start, minimum, maximum, choices; inputs and outputs lie at their numbers,
- * Reals before all others.
+ * Generated from the declaration of the ports. The columns are name, type, causality, variability,
+ * place of the value, start, minimum, maximum, choices. The place of an input or output is its
+ * index among them, Reals first.
  */
 #include <float.h>
 #include <stddef.h>
@@ -34,19 +34,19 @@ static const double MOST_INTERNAL_STEPS = {float(euler.MOST_INTERNAL_STEPS)!r};
 #define PARAMETER_AT(member) offsetof(parameter_values, member)
 """
 
-#: What numbers of the state are called in C, by their types in Python.
+#: Types of the state's numbers in C, by their types in Python.
 _TYPES = {float: "REAL", int: "INTEGER", bool: "BOOLEAN"}
 
 
 def tables(definition: Definition, arrays: bool = False) -> str:
-    """The file ports.h of a component; some of its ports may be elements of arrays."""
-    said = definition.behaviour
+    """Write the file ports.h of a component."""
+    behaviour = definition.behaviour
     places = places_of(definition, "model") | {H_MAX: "PARAMETER_AT(h_max)"}
-    return port_tables(definition.ports, places, scalars_of(said.state), arrays)
+    return port_tables(definition.ports, places, scalars_of(behaviour.state), arrays)
 
 
 def places_of(definition: Definition, owner: str) -> dict[str, str]:
-    """The places of parameters, all but `h_max`, by their names, in a member of their structure."""
+    """Return the places of parameters but `h_max`, by name, in a member of a structure."""
     type_ = type_of(definition.behaviour.parameters)
     paths = definition.parameters.paths.items()
     return {name: f"PARAMETER_AT({owner}{_member(type_, path)})" for name, path in paths}
@@ -55,15 +55,7 @@ def places_of(definition: Definition, owner: str) -> dict[str, str]:
 def port_tables(
     ports: Sequence[Port], parameters: Mapping[str, str], state: Iterable[Any], arrays: bool = False
 ) -> str:
-    """The file ports.h.
-
-    Args:
-        ports: all but `fault`.
-        parameters: places of parameters, by their names.
-        state: the types of its numbers, in Python.
-        arrays: whether ports of one array are one variable.
-
-    """
+    """Write the file ports.h for all ports but `fault`; `state` are the types of its numbers."""
     values = {
         causality: reals_first([port for port in ports if port.causality == causality])
         for causality in ("input", "output")
@@ -89,7 +81,7 @@ def port_tables(
 
 
 def _arrays(ports: Sequence[Port]) -> Iterator[str]:
-    """How many ports a value reference stands for: those of an array that begins there."""
+    """Write the number of elements for each value reference, which is 1 for a scalar."""
     sizes = [1] * len(ports)
     for reference, _, elements in variables_of(ports, arrays=True):
         sizes[reference - 1] = len(elements)
@@ -97,7 +89,7 @@ def _arrays(ports: Sequence[Port]) -> Iterator[str]:
 
 
 def _member(type_: Type, path: Sequence[str | int]) -> str:
-    """Where a number lies in a structure."""
+    """Return the member of a structure at a path."""
     text = ""
     for step in path:
         place = step
@@ -127,7 +119,7 @@ def _row(port: Port, places: Mapping[str, str], names: Mapping[str, str]) -> str
 
 
 def names_of_choices(ports: Sequence[Port]) -> dict[str, str]:
-    """The name of the table of each port's choices, by the port's; `a.b` is not `a_b`."""
+    """Return unique names of the tables of choices, by the names of ports."""
     names: dict[str, str] = {}
     for port in filter(lambda port: port.choices, ports):
         name = f"choices_of_{re.sub('[^A-Za-z0-9]', '_', port.name)}"
@@ -143,7 +135,7 @@ def _choices(name: str, choices: Mapping[str, Any]) -> str:
 
 
 def _references(causality: str, values: Sequence[Port], ports: Sequence[Port]) -> str:
-    """The value references of a causality, in the order of their values; C has no empty arrays."""
+    """Write the value references of a causality in the order of values; C has no empty arrays."""
     places = {port.name: place for place, port in enumerate(ports)}
     found = [places[port.name] for port in values] or [0]
     numbers = ", ".join(f"FIRST_REFERENCE + {place}" for place in found)
@@ -151,7 +143,7 @@ def _references(causality: str, values: Sequence[Port], ports: Sequence[Port]) -
 
 
 def _counts(values: Mapping[str, Sequence[Port]]) -> Iterator[str]:
-    """How many Reals come before all others, and whether those that are set have a range."""
+    """Write the numbers of Reals, and whether a Real input has a range."""
     reals = {
         causality: [port for port in found if port.type == "Real"]
         for causality, found in values.items()
@@ -164,7 +156,7 @@ def _counts(values: Mapping[str, Sequence[Port]]) -> Iterator[str]:
 
 
 def _state(scalars: Iterable[Any]) -> Iterator[str]:
-    """What the numbers of a state are, one after the other."""
+    """Write the types of a state's numbers, in order."""
     runs = [(scalar, len([*found])) for scalar, found in groupby(scalars)]
     rows: list[str] = []
     enumerations: dict[Any, str] = {}

@@ -1,8 +1,8 @@
-"""The equations of a component in C, with the glue by which the runtime calls them.
+"""The equations of a component in C, and the functions by which the runtime calls them.
 
-The runtime has inputs, outputs and states as arrays of doubles, whatever they are. Where all their
-numbers are floats, a structure of the equations is such an array already. Where some are not,
-functions that are written here go over it number by number: ints of 32 bits are exact in doubles.
+In the runtime, inputs, outputs and states are arrays of doubles. A structure whose numbers are all
+floats has the same layout. Other structures are converted by generated functions, one number after
+another; ints of 32 bits are exact in doubles.
 """
 
 from __future__ import annotations
@@ -29,8 +29,7 @@ from fmus.language.types import (
 )
 from fmus.native.emit import LINE_WIDTH, Emitter, closed, lines_of, quoted
 from fmus.native.names import in_c
-from fmus.native.numbers import has_only_doubles, moves
-from fmus.native.pieces import function, initializer
+from fmus.native.pieces import function, has_only_doubles, initializer, moves
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
@@ -38,17 +37,17 @@ from fmus.ports.groups import Nothing
 _HEAD = """\
 /* {title}
  *
- * Translated from the Python text of its equations, function by function, in the order in which
- * they need each other. A name begins with the module that the function stands in.{citation}
+ * Translated from the Python source of its equations, function by function; each function follows
+ * those that it calls. A name begins with the name of the function's module.{citation}
  */
 #include "arithmetic.h"
 """
 
-#: Bytes that the equations may take of a thread's stack, of which macOS gives 512 kB: the host and
-#: the runtime take some, too.
+#: Bytes on a thread's stack for the equations. The stack has 512 kB on macOS, and the host and the
+#: runtime need some, too.
 _MOST_ON_STACK = 384 * 1024
 
-#: Bytes that a number takes, alone in a structure.
+#: Size of a number in a structure [bytes].
 _NUMBER = 8
 
 _P, _S, _I = (
@@ -60,7 +59,7 @@ _D, _O, _E = "const model_derived *derived", "model_outputs *outputs", "Error *e
 _NEXT, _SCRATCH = "model_state *state", "model_derived *derived"
 
 
-#: What the runtime asks of hooks: whether they take an argument.
+#: Constants for the runtime that are true if a hook takes an argument.
 _TAKES = {
     "OUTPUTS_TAKE_PARAMETERS": ("outputs", "parameters"),
     "OUTPUTS_TAKE_DERIVED": ("outputs", "derived"),
@@ -72,11 +71,11 @@ _TAKES = {
     "DERIVE_TAKES_TIME": ("derive", "t"),
 }
 
-#: All that the runtime asks: besides, how many numbers noise takes, whether outputs are held,
-#: whether a state may be given up, and whether an update finds out itself what cannot be a state.
+#: All constants for the runtime: also the number of random numbers, whether outputs are sampled,
+#: whether a state may be replaced, and whether an update checks its own result.
 _ASKED = ("DRAWS", "SAMPLED", "HAS_GUARD", "CHECKS_STATES", *_TAKES)
 
-#: What the runtime calls: what each returns and takes, and what it does where nothing is to do.
+#: Functions for the runtime: result, arguments, and the body if a component has no such hook.
 _CALLED = {
     "check": ("void", f"{_P}, {_E}", ()),
     "check_state": ("void", f"{_P}, {_S}, {_E}", ()),
@@ -93,15 +92,21 @@ _CALLED = {
 
 @cache
 def translated(definition: Definition) -> str:
-    """The equations of a component, and the functions that the component calls.
+    """Translate the equations of a component, and add the functions for the runtime.
 
     Raises:
         Untranslatable: its text is outside the language of equations.
 
     """
-    said = definition.behaviour
-    program = Program(*filter(None, said.hooks.values()))
-    groups = (said.parameters, said.inputs, said.outputs, said.state, said.derived or Nothing)
+    behaviour = definition.behaviour
+    program = Program(*filter(None, behaviour.hooks.values()))
+    groups = (
+        behaviour.parameters,
+        behaviour.inputs,
+        behaviour.outputs,
+        behaviour.state,
+        behaviour.derived or Nothing,
+    )
     for group in groups:
         try:
             type_of(group)
@@ -113,24 +118,26 @@ def translated(definition: Definition) -> str:
         raise Untranslatable(
             f"{deep.name} and the functions that it calls hold "
             f"{bytes_on_stack // _NUMBER} numbers at once; C takes at most "
-            f"{_MOST_ON_STACK // _NUMBER}, which lie on a thread's stack"
+            f"{_MOST_ON_STACK // _NUMBER}, since they are on a thread's stack"
         )
     emitter = Emitter(program.functions.values())
-    glue = _glue(emitter, program, said)
+    glue = _glue(emitter, program, behaviour)
     citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
     head = _HEAD.format(title=closed(definition.summary), citation=closed(citation))
     return "\n\n".join([head, emitter.text(), glue]) + "\n"
 
 
-def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
-    """The functions `model_...`, in which the component finds all hooks, also those it has not."""
-    functions = {name: program.function(hook) for name, hook in said.hooks.items() if hook}
+def _glue(emitter: Emitter, program: Program, behaviour: Behaviour) -> str:
+    """Write the functions `model_...`, which the runtime calls, also for missing hooks."""
+    functions = {name: program.function(hook) for name, hook in behaviour.hooks.items() if hook}
     passages = {
         what: _passage(emitter, what, type_of(hint))
         for what, hint in (
-            ("inputs", said.inputs), ("outputs", said.outputs), ("state", said.state),
+            ("inputs", behaviour.inputs),
+            ("outputs", behaviour.outputs),
+            ("state", behaviour.state),
         )
-    }  # fmt: skip
+    }
     given = {
         "parameters": "*parameters",
         "inputs": passages["inputs"].got("inputs"),
@@ -145,54 +152,56 @@ def _glue(emitter: Emitter, program: Program, said: Behaviour) -> str:
     alone = {name: [f"{call};"] for name, call in calls.items()}
 
     def put(what: str, hook: str) -> list[str]:
-        """What hands the result of a hook over."""
+        """Return the statement that stores the result of a hook."""
         return [passages[what].put(what, calls[hook])] if hook in calls else []
 
     bodies = {
         **{name: alone.get(name, []) for name in ("check", "check_state")},
         "start": put("state", "start"),
         "restart": put("state", "restarted"),
-        "derive": [f"*derived = {calls['derive']};"] if said.derived else [],
+        "derive": [f"*derived = {calls['derive']};"] if behaviour.derived else [],
         "evaluate": put("outputs", "outputs"),
         "update": put("state", "update"),
     }
     if "seed" in calls:
-        # A negative seed is the number 2^32 above it.
+        # The cast adds 2^32 to a negative seed.
         bodies["seed"] = [f"return (unsigned int){calls['seed']};"]
     if "credible" in calls:
         bodies["credible"] = [f"return {calls['credible']};"]
-    if said.noisy:
-        bodies["measure"] = _measured(emitter, said, passages["outputs"], functions["measured"])
-    parts = [_constants(said), *defined(bodies)]
+    if behaviour.noisy:
+        bodies["measure"] = _measured(
+            emitter, behaviour, passages["outputs"], functions["measured"]
+        )
+    parts = [_constants(behaviour), *defined(bodies)]
     text = "\n\n".join(parts)
-    # One that nothing calls would be a warning.
+    # Compilers warn of static functions that are not called.
     moving = [
         one
         for form in passages.values()
         for name, one in zip((form.gather, form.scatter), form.functions)
         if re.search(rf"\b{name}\(", text)
     ]
-    head = ["/* What the component calls. */", _types(emitter, said, passages), *moving]
+    head = ["/* The functions for the runtime. */", _types(emitter, behaviour, passages), *moving]
     return "\n\n".join([*head, text])
 
 
-def _constants(said: Behaviour) -> str:
-    """What follows from the hooks before any of them is called."""
+def _constants(behaviour: Behaviour) -> str:
+    """Write the constants that follow from the hooks."""
     found = {
-        "DRAWS": said.draws,
-        "SAMPLED": said.is_sampled,
-        "HAS_GUARD": said.hooks["credible"] is not None,
-        **{name: said.takes(*question) for name, question in _TAKES.items()},
+        "DRAWS": behaviour.draws,
+        "SAMPLED": behaviour.is_sampled,
+        "HAS_GUARD": behaviour.hooks["credible"] is not None,
+        **{name: behaviour.takes(*question) for name, question in _TAKES.items()},
     }
-    return constants(found, _directives(said.restarted))
+    return constants(found, _directives(behaviour.restarted))
 
 
 def constants(found: Mapping[str, int], restarted: str = "") -> str:
-    """What the runtime asks before it calls anything.
+    """Write the constants for the runtime.
 
     Args:
-        found: the answers, by their names; those that are missing are 0.
-        restarted: what is logged when a state is given up, as `compose` takes it.
+        found: constants by name; missing ones are 0.
+        restarted: message when a state is replaced, in the format of `compose`.
 
     """
     rows = "".join(f"    MODEL_{name} = {int(found.get(name, 0))},\n" for name in _ASKED)
@@ -200,36 +209,36 @@ def constants(found: Mapping[str, int], restarted: str = "") -> str:
 
 
 def _directives(text: str) -> str:
-    """A text for `str.format` that names the time, as one for `compose`."""
+    """Convert a text with the time from `str.format` to `compose`."""
     return "".join(
         before.replace("%", "%%") + ("" if name is None else f"%{form or 'r'}")
         for before, name, form, _ in Formatter().parse(text)
     )
 
 
-def _types(emitter: Emitter, said: Behaviour, passages: dict[str, _Passage]) -> str:
+def _types(emitter: Emitter, behaviour: Behaviour, passages: dict[str, _Passage]) -> str:
     defined = {
-        "model_parameters": emitter.type(type_of(said.parameters)),
+        "model_parameters": emitter.type(type_of(behaviour.parameters)),
         **{f"model_{what}": passage.declaration for what, passage in passages.items()},
-        "model_derived": emitter.type(type_of(said.derived or Nothing)),
+        "model_derived": emitter.type(type_of(behaviour.derived or Nothing)),
     }
-    hints = {"INPUTS": said.inputs, "OUTPUTS": said.outputs, "STATE": said.state}
+    hints = {"INPUTS": behaviour.inputs, "OUTPUTS": behaviour.outputs, "STATE": behaviour.state}
     counts = [f"MODEL_{what} = {count(type_of(hint))}" for what, hint in hints.items()]
     types = "".join(f"typedef {text} {name};\n" for name, text in defined.items())
     return f"{types}\nenum {{ {', '.join(counts)} }};"
 
 
 def _measured(
-    emitter: Emitter, said: Behaviour, outputs: _Passage, function: Function
+    emitter: Emitter, behaviour: Behaviour, outputs: _Passage, function: Function
 ) -> list[str]:
-    """What gives a group of outputs its noise."""
+    """Return the statements that add noise to a group of outputs."""
     type_ = function.arguments["n"]
-    n = initializer(type_, map("draws[{}]".format, range(said.draws)))
+    n = initializer(type_, map("draws[{}]".format, range(behaviour.draws)))
     if not isinstance(type_, Scalar):
         n = f"({emitter.type(type_)}){n}"
     where = "groups." if outputs.gather else "outputs->"
-    group = f"{where}{in_c(said.noisy)}"
-    given = {"parameters": "*parameters", "n": n, said.noisy: group}
+    group = f"{where}{in_c(behaviour.noisy)}"
+    given = {"parameters": "*parameters", "n": n, behaviour.noisy: group}
     change = f"{group} = {emitter.call(function, [given[name] for name in function.arguments])};"
     if not outputs.gather:
         return [change]
@@ -241,7 +250,7 @@ def _measured(
 
 
 def defined(bodies: Mapping[str, Sequence[str]]) -> list[str]:
-    """The functions that the runtime calls, with what they do."""
+    """Write the functions for the runtime with their bodies."""
     return [
         _defined(returns, name, arguments, bodies.get(name) or idle)
         for name, (returns, arguments, idle) in _CALLED.items()
@@ -256,13 +265,13 @@ def _defined(returns: str, name: str, arguments: str, body: Sequence[str]) -> st
 
 @dataclass
 class _Passage:
-    """How one of them passes between the runtime and the equations.
+    """Conversion of inputs, outputs or a state between the runtime and the equations.
 
     Attributes:
-        type: of the equations, in C.
-        declaration: of the type in the runtime.
-        gather, scatter: names of the functions between the two forms; empty: both are the same.
-        functions: their texts.
+        type: type of the equations, in C.
+        declaration: type of the runtime.
+        gather, scatter: names of functions that convert; empty if both layouts are the same.
+        functions: texts of these functions.
 
     """
 
@@ -273,18 +282,18 @@ class _Passage:
     functions: Sequence[str] = ()
 
     def got(self, pointer: str) -> str:
-        """The structure of the equations, from where the runtime has it."""
+        """Return the expression of the equations' structure from a pointer of the runtime."""
         return f"{self.gather}({pointer}->v)" if self.gather else f"*{pointer}"
 
     def put(self, pointer: str, value: str) -> str:
-        """The statement that hands a structure over to the runtime."""
+        """Return the statement that stores a structure for the runtime."""
         if self.scatter:
             return f"{self.scatter}({value}, {pointer}->v);"
         return f"*{pointer} = {value};"
 
 
 def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
-    """How inputs, outputs or a state pass; ports have their Reals first, a state has none first."""
+    """Return the conversion of inputs, outputs or a state; values of ports have Reals first."""
     name = emitter.type(type_)
     if has_only_doubles(type_) or not count(type_):
         return _Passage(name, name)
@@ -309,15 +318,15 @@ def deepest(
     functions: Iterable[Function],
     shared: Callable[[Function], Collection[str]] = lambda function: {function.by_address},
 ) -> tuple[int, Function | None]:
-    """The most bytes that lie on a thread's stack in a call from outside, and the call of what.
+    """Return the most bytes on a thread's stack in a call from outside, and the called function.
 
     Structures are passed and returned by value, so a function that adds large vectors keeps each
-    sum there. Nothing calls itself, and all sizes are fixed: what lies there at most can be added
-    up. Compilers that optimise keep no more than this, but for a tenth.
+    sum on the stack. There is no recursion, and all sizes are fixed, so the sizes can be added.
+    Optimising compilers need at most a tenth more.
 
     Args:
-        functions: each after those that it calls.
-        shared: the arguments and variables of one that are not copied.
+        functions: functions, each after those that it calls.
+        shared: returns the arguments and variables of a function that are not copied.
 
     """
     depths: dict[Function, int] = {}
@@ -333,12 +342,12 @@ def deepest(
 
 
 def _result(type_: Type) -> int:
-    """The bytes of a structure; a number lies in a register."""
+    """Return the bytes of a structure; numbers are in registers."""
     return 0 if isinstance(type_, Scalar) else _NUMBER * count(type_)
 
 
 def _held(one: Expression, within: bool = False) -> int:
-    """The bytes of the structures that an expression makes, and that are returned to it."""
+    """Return the bytes of the structures that an expression makes or receives from calls."""
     is_made = isinstance(one, Make)
     own = _result(one.type) if isinstance(one, Call) or (is_made and not within) else 0
     return own + sum(_held(part, is_made) for part in one.parts)

@@ -17,7 +17,7 @@ SAMPLED = True
 
 H_MAX = STEP
 
-#: What is said, at time t [s], of a measurement that is not credible.
+#: Message about a measurement that is not credible, at time t [s].
 RESTARTED = (
     "observer restarted at t = {t:g} s: the measured position is further from its estimate than "
     "innovation_gate"
@@ -25,7 +25,7 @@ RESTARTED = (
 
 
 class Outputs(NamedTuple):
-    """The command, and what the controller knows."""
+    """The command, estimates and errors."""
 
     tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments (21), not limited")]
     y_hat: Annotated[
@@ -52,40 +52,40 @@ class Outputs(NamedTuple):
 
 
 def start(parameters: Gains, inputs: Measurement) -> ControllerState:
-    """State at the start."""
+    """Return the state at the start."""
     return output_feedback.initial_state(parameters, inputs.y)
 
 
 def credible(parameters: Gains, state: ControllerState, inputs: Measurement) -> bool:
-    """Whether a run may go on from a state."""
+    """Return True if the measurement agrees with the state."""
     return output_feedback.credible(parameters, state, inputs.y)
 
 
 def restarted(parameters: Gains, state: ControllerState, inputs: Measurement) -> ControllerState:
-    """The state that it goes on from if it may not."""
+    """Return the state after a restart of the observer."""
     return output_feedback.restarted(parameters, state, inputs.y)
 
 
 def derive(parameters: Gains, state: ControllerState, inputs: Measurement) -> Signals:
-    """The signals, for a step as long as the last one."""
+    """Return the signals, for a step as long as the last one."""
     return output_feedback.evaluate(parameters, state, inputs, state.h)
 
 
 def update(
     parameters: Gains, state: ControllerState, derived: Signals, inputs: Measurement, h: float
 ) -> ControllerState:
-    """State after a step."""
+    """Return the state after a step."""
     if parameters.form == EXACT and h != state.h:
         derived = output_feedback.evaluate(parameters, state, inputs, h)
     return output_feedback.step(state, derived, h)
 
 
 def outputs(state: ControllerState, derived: Signals) -> Outputs:
-    """The command, and what the controller knows."""
+    """Return the command, estimates and errors."""
     return Outputs(derived.tau, state.y_hat, derived.dy_hat, state.theta_hat, derived.e, derived.z)
 
 
 def check_state(state: ControllerState) -> None:
-    """Refuse a last step that went back."""
+    """Refuse a negative last step."""
     if state.h < 0.0:
         raise Refusal("its last step is shorter than zero")

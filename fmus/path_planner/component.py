@@ -27,17 +27,17 @@ def check(parameters: Parameters) -> None:
 
 
 def start(parameters: Parameters, t: float) -> PathState:
-    """State at the start."""
+    """Return the state at the start."""
     return path_planner.initial_state(parameters.waypoints, t)
 
 
 def update(parameters: Parameters, state: PathState, t: float, h: float) -> PathState:
-    """State after a step."""
+    """Return the state after a step."""
     return path_planner.advance(parameters.waypoints, state, t + h)
 
 
 def outputs(parameters: Parameters, state: PathState) -> Outputs:
-    """The reference."""
+    """Return the reference and the posture."""
     waypoints = parameters.waypoints
     wanted = path_planner.reference(waypoints, state.ahead, state.t)
     along = path_planner.course(waypoints, state.ahead, wanted.dy_d)
@@ -45,7 +45,7 @@ def outputs(parameters: Parameters, state: PathState) -> Outputs:
 
 
 def check_state(parameters: Parameters, state: PathState) -> None:
-    """Refuse a corner ahead that is not the one at its time."""
+    """Refuse a next corner that contradicts the time."""
     waypoints = parameters.waypoints
     first = path_planner.first_corner(waypoints, state.start)
     ahead = path_planner.corner_ahead(waypoints, first, state.t)

@@ -18,13 +18,13 @@ H_MAX = STEP
 
 
 class State(NamedTuple):
-    """The adaptive law is all that has a memory."""
+    """State of the adaptive law."""
 
     theta_hat: Vector4
 
 
 class Outputs(NamedTuple):
-    """The command, and what the controller knows."""
+    """The command, estimates and the error."""
 
     tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments (57), not limited")]
     theta_hat: Estimate
@@ -35,20 +35,20 @@ class Outputs(NamedTuple):
 
 
 def start(parameters: PdGains) -> State:
-    """State at the start."""
+    """Return the state at the start."""
     return State(parameters.theta_0)
 
 
 def derive(parameters: PdGains, state: State, inputs: PdMeasurement) -> PdSignals:
-    """The signals."""
+    """Return the signals."""
     return pd.evaluate(parameters, state.theta_hat, inputs)
 
 
 def update(state: State, derived: PdSignals, h: float) -> State:
-    """State after a step."""
+    """Return the state after a step."""
     return State(pd.step(state.theta_hat, derived, h))
 
 
 def outputs(state: State, derived: PdSignals) -> Outputs:
-    """The command, and what the controller knows."""
+    """Return the command, estimates and the error."""
     return Outputs(derived.tau, state.theta_hat, derived.e)

@@ -1,15 +1,16 @@
-"""What a component declares, and how that is written down for hosts.
+"""Declarations of components, and their descriptions for hosts.
 
 ======================== =================================================================
-module                   what it states
+module                   content
 ======================== =================================================================
-:mod:`.port`             one port: its declaration and what values it takes
-:mod:`.groups`           flat values of ports from groups, and groups from flat values
-:mod:`.units`            units and what they are in SI units
-:mod:`.fields`           a field of a class as a port, or as a group of them
-:mod:`.behaviour`        what a component may say: its hooks and constants
-:mod:`.definition`       all that the module of a component says of it
-:mod:`.description`      modelDescription.xml of FMI 2.0, and what all versions share
-:mod:`.description_fmi3` what a host reads of FMI 3.0: description, build, terminals
+:mod:`.port`             a port: its declaration, and the values that it accepts
+:mod:`.groups`           conversion between flat values of ports and groups
+:mod:`.units`            units in terms of SI units
+:mod:`.fields`           ports from the fields of a class
+:mod:`.behaviour`        hooks and constants of a component
+:mod:`.reducer`          hooks and results of an index
+:mod:`.definition`       the whole definition of a component
+:mod:`.description`      modelDescription.xml of both versions, buildDescription.xml
+:mod:`.terminals`        terminalsAndIcons.xml of FMI 3.0
 ======================== =================================================================
 """

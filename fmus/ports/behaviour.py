@@ -1,8 +1,8 @@
-"""What a component may say: the hooks that both kinds of FMU call.
+"""The hooks of a component, which both kinds of FMU call.
 
-They are those of x_k+1 = update(x_k, u_k) and y_k = outputs(x_k, u_k). A hook takes the arguments
-that it needs, under their names and in any order. All of it is in the language of equations
-(language.md), because the C kind runs its translation.
+They are the functions of x_k+1 = update(x_k, u_k) and y_k = outputs(x_k, u_k). A hook takes the
+arguments that it needs, under their names and in any order. All hooks are in the language of
+equations (language.md), because the C kind runs their translation.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from fmus.ports.groups import (
 )
 from fmus.ports.port import Misdeclared
 
-#: The functions that a component may have, and their arguments: docs/explanation/component.md says
-#: when each is called, and what it returns. `measured` also takes the group that it returns.
+#: The functions that a component may have, and their arguments; docs/explanation/component.md
+#: describes their calls and results. `measured` also takes the group that it returns.
 HOOKS: Mapping[str, tuple[str, ...]] = {
     "check": ("parameters",),
     "start": ("parameters", "inputs", "t"),
@@ -44,29 +44,29 @@ HOOKS: Mapping[str, tuple[str, ...]] = {
     "check_state": ("parameters", "state"),
 }
 
-#: How a number in a text may be written: as C writes it, too.
+#: Formats of numbers in texts that C supports, too.
 NUMBER_FORMAT = re.compile(r"[+ ]?(?:[1-9][0-9]{0,2})?(?:\.[0-9]{1,3})?[efgEG]")
 
-#: What goes together.
+#: Sets of names: a component has all names of a set, or none.
 _TOGETHER = (("start", "update"), ("credible", "restarted", "RESTARTED"), ("seed", "measured"))
 
-#: Classes that hooks take, if they are there, by the argument.
+#: Classes that a hook must take if a component has them, and the argument.
 _CLASSES = {"Parameters": "parameters", "Inputs": "inputs", "State": "state"}
 
 
 class Behaviour(NamedTuple):
-    """What the hooks of a component say.
+    """The hooks and constants of a component.
 
     Attributes:
-        hooks: all by name; None for one that it does not have.
-        parameters, inputs, state, outputs: types that they take and return.
-        derived: what `derive` returns; None without it.
-        noisy: the group of outputs that `measured` gives; empty: there is none.
-        draws: how many numbers it takes.
-        restarted: the text `RESTARTED`, as `str.format` takes it.
-        is_sampled: whether the outputs belong to the last communication point.
-        h_max: default of the largest internal step [s]; None: no step is split.
-        step, stop: of the default experiment [s].
+        hooks: all hooks by name; None for a missing one.
+        parameters, inputs, state, outputs: types that hooks take and return.
+        derived: type that `derive` returns; None without this hook.
+        noisy: name of the group of outputs that `measured` returns; empty without this hook.
+        draws: number of random numbers that `measured` takes.
+        restarted: the text `RESTARTED`, for `str.format`.
+        is_sampled: True if the outputs belong to the last communication point.
+        h_max: default of the largest internal step [s]; None if no step is split.
+        step, stop: times of the default experiment [s].
 
     """
 
@@ -85,12 +85,12 @@ class Behaviour(NamedTuple):
     stop: float
 
     def arguments(self, name: str) -> tuple[str, ...]:
-        """The arguments of a hook, in its own order; none of one that it does not have."""
+        """Return the arguments of a hook, in its own order; empty for a missing hook."""
         hook = self.hooks[name]
         return tuple(signature(hook).parameters) if hook else ()
 
     def takes(self, name: str, argument: str) -> bool:
-        """Whether a hook takes an argument, or what it takes is made of it."""
+        """Return True if a hook takes an argument, directly or through another hook's result."""
         taken = {*self.arguments(name)}
         if name == "outputs" and "parameters" in self.arguments("measured"):
             taken.add("parameters")
@@ -102,32 +102,29 @@ class Behaviour(NamedTuple):
         return argument in taken
 
 
-#: Types of the arguments of hooks that are the same for all components.
+#: Types of arguments that are the same for all components.
 _ARGUMENTS: Mapping[str, Any] = {"t": float, "h": float}
 
-#: Arguments whose types are the component's own.
+#: Arguments whose types each component declares.
 _GROUPS = ("parameters", "inputs", "state", "derived")
 
-#: Types of what hooks return that are the same for all components.
+#: Types of results that are the same for all components.
 _RETURNS: Mapping[str, Any] = {
     "check": type(None), "check_state": type(None), "credible": bool, "seed": int,
 }  # fmt: skip
 
-#: What other hooks return, by the argument that has the same type.
+#: The argument that has the same type as the result of a hook.
 _SAME = {"start": "state", "update": "state", "restarted": "state", "derive": "derived"}
 
 
 def read_behaviour(module: ModuleType) -> Behaviour:
-    """What the hooks of a component say.
-
-    Args:
-        module: of the component.
+    """Read the hooks and constants of a component's module.
 
     Raises:
-        Misdeclared: it is none.
+        Misdeclared: it is not a component.
 
     """
-    where, said = module.__name__, vars(module)
+    where, names = module.__name__, vars(module)
     hooks = _hooks(module)
     hints = {name: types_of_hook(f"{where}.{name}", hook) for name, hook in hooks.items()}
     outputs = hints["outputs"]["return"]
@@ -154,7 +151,7 @@ def read_behaviour(module: ModuleType) -> Behaviour:
             raise Misdeclared(f"{where}.{takes[0]} takes {why}", takes[0], argument)
         check_type(hint, *takes[:1], argument)
     for cls, argument in _CLASSES.items():
-        if cls in said and argument not in types:
+        if cls in names and argument not in types:
             raise Misdeclared(f"{cls} is there, but no hook takes {argument}", cls)
     behaviour = Behaviour(
         {name: hooks.get(name) for name in HOOKS},
@@ -165,18 +162,18 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         types.get("derived"),
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
-        _message(where, said.get("RESTARTED", "")),
-        said.get("SAMPLED", False),
-        seconds_in(said, "H_MAX", None),
-        seconds_in(said, "STEP_SIZE", 0.02),
-        seconds_in(said, "STOP_TIME", 100.0),
+        _message(where, names.get("RESTARTED", "")),
+        names.get("SAMPLED", False),
+        seconds_in(names, "H_MAX", None),
+        seconds_in(names, "STEP_SIZE", 0.02),
+        seconds_in(names, "STOP_TIME", 100.0),
     )
     _check_constants(where, behaviour)
     return behaviour
 
 
 def _check_constants(where: str, behaviour: Behaviour) -> None:
-    """Refuse constants that do not go with the hooks."""
+    """Refuse constants that contradict the hooks."""
     if not isinstance(behaviour.is_sampled, bool):
         raise Misdeclared(f"SAMPLED is {behaviour.is_sampled!r:.40}; write True or False")
     if behaviour.is_sampled and not behaviour.takes("outputs", "inputs"):
@@ -185,9 +182,9 @@ def _check_constants(where: str, behaviour: Behaviour) -> None:
         raise Misdeclared(f"{where} has H_MAX, but no update", "outputs")
 
 
-def seconds_in(said: Mapping[str, Any], name: str, default: Any) -> Any:
-    """A time that a component states."""
-    found = said.get(name, default)
+def seconds_in(names: Mapping[str, Any], name: str, default: Any) -> Any:
+    """Read a constant that is a time, as a float."""
+    found = names.get(name, default)
     is_number = isinstance(found, (float, int)) and not isinstance(found, bool)
     if found is not default and not (is_number and isfinite(found) and found > 0):
         raise Misdeclared(f"{name} is {found!r:.40}; write seconds, more than 0")
@@ -195,24 +192,24 @@ def seconds_in(said: Mapping[str, Any], name: str, default: Any) -> Any:
 
 
 def _hooks(module: ModuleType) -> dict[str, FunctionType]:
-    """The hooks of a component, if it has those that belong together, and no others."""
-    where, said = module.__name__, vars(module)
-    if "outputs" not in said:
+    """Return the hooks of a component; refuse an incomplete set, and misspelt names."""
+    where, names = module.__name__, vars(module)
+    if "outputs" not in names:
         raise Misdeclared(f"{where} has no function outputs")
     for together in _TOGETHER:
-        there = [name for name in together if name in said]
-        missing = [name for name in together if name not in said]
+        there = [name for name in together if name in names]
+        missing = [name for name in together if name not in names]
         if there and missing:
             raise Misdeclared(f"{where} has {there[0]}, but no {missing[0]}", there[0])
-    for name, value in said.items():
+    for name, value in names.items():
         if name in HOOKS and not isinstance(value, FunctionType):
-            raise Misdeclared(f"{where}.{name} is no function, but has the name of a hook", name)
+            raise Misdeclared(f"{where}.{name} is not a function, but has the name of a hook", name)
     check_spelling(module, HOOKS)
-    return {name: said[name] for name in HOOKS if name in said}
+    return {name: names[name] for name in HOOKS if name in names}
 
 
 def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) -> list[str]:
-    """The group of outputs that `measured` takes and returns, if all arguments are known."""
+    """Return the group of outputs that `measured` takes and returns; refuse unknown arguments."""
     groups = fields_of(outputs)
     noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
     for name, found in hints.items():
@@ -239,18 +236,18 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
 
 
 def _types_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """The type that each argument has in all hooks: what most of them say."""
+    """Return the type of each argument: the one that most hooks declare."""
     found: dict[str, list[Any]] = {}
     for name, hint in hints.items():
-        said = [(argument, argument) for argument in _GROUPS if argument in hint]
-        for group, place in [*said, *([(_SAME[name], "return")] if name in _SAME else [])]:
+        pairs = [(argument, argument) for argument in _GROUPS if argument in hint]
+        for group, place in [*pairs, *([(_SAME[name], "return")] if name in _SAME else [])]:
             found.setdefault(group, []).append(form(hint[place]))
     types = {name: max(forms, key=forms.count) for name, forms in found.items()}
     return {**types, **_ARGUMENTS}
 
 
 def check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> None:
-    """Refuse an argument, or a result, of another type than it has everywhere else."""
+    """Refuse an argument or a result whose type differs between hooks."""
     if form(hint) != form(wanted):
         takes = "returns" if argument == "return" else f"takes {argument} as"
         why = f"{takes} {word(form(hint))}; write {word(form(wanted))}"
@@ -258,7 +255,7 @@ def check_same(where: str, name: str, argument: str, hint: Any, wanted: Any) -> 
 
 
 def check_spelling(module: ModuleType, hooks: Collection[str]) -> None:
-    """Refuse a function that nothing calls and that has nearly the name of a hook."""
+    """Refuse an unused function with a name similar to a hook's."""
     own = {
         name: value
         for name, value in vars(module).items()
@@ -272,7 +269,7 @@ def check_spelling(module: ModuleType, hooks: Collection[str]) -> None:
 
 
 def _names_in(code: CodeType) -> Iterator[str]:
-    """The names outside of a function that it uses, also in functions within it."""
+    """Yield the global names that a function uses, also in nested functions."""
     yield from code.co_names
     for constant in code.co_consts:
         if isinstance(constant, CodeType):
@@ -280,7 +277,7 @@ def _names_in(code: CodeType) -> Iterator[str]:
 
 
 def _message(where: str, text: Any) -> str:
-    """The text `RESTARTED`, if both kinds can write it."""
+    """Return the text `RESTARTED`; refuse one that only Python could format."""
     try:
         fields = [found[1:] for found in Formatter().parse(text) if found[1] is not None]
         good = [
@@ -296,7 +293,7 @@ def _message(where: str, text: Any) -> str:
 
 
 def types_of_hook(where: str, hook: FunctionType) -> dict[str, Any]:
-    """The types of a hook's arguments and of what it returns."""
+    """Return the types of a hook's arguments and of its result."""
     try:
         hints = hints_of(hook)
     except NameError as error:

@@ -1,4 +1,4 @@
-"""What a component is: the one thing that both kinds of FMU, and its page, are made from."""
+"""Definitions of components, from which both kinds of FMU and the page are made."""
 
 from __future__ import annotations
 
@@ -18,33 +18,33 @@ from fmus.ports.units import unit_of
 
 
 class Origin(NamedTuple):
-    """Where a component comes from: what its module says as `__author__`, and so on."""
+    """Origin of a component: its module's `__author__`, `__license__` and so on."""
 
     author: str = ""
     license: str = ""
     version: str = ""
-    citation: str = ""  #: what its equation numbers refer to
+    citation: str = ""  #: source of its equation numbers
 
 
 class DefaultExperiment(NamedTuple):
-    """The experiment that a host runs if nothing else is asked for; times are in seconds."""
+    """The experiment that a host runs by default; times are in seconds."""
 
     stop: float
     step: float
     start: float = 0.0
-    takes_any_step: bool = True  #: whether steps of another size can be made, too
+    takes_any_step: bool = True  #: True if other step sizes are possible, too
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """What the description of an FMU says.
+    """Content of an FMU's description.
 
     Attributes:
-        name: of the model, and of its FMU.
+        name: name of the model and of its FMU.
         summary: one line.
-        origin: where it comes from.
-        ports: all but `fault`, in the order of their value references.
-        experiment: that it is made for.
+        origin: author, licence, version and citation.
+        ports: all ports but `fault`, in the order of their value references.
+        experiment: the default experiment.
 
     """
 
@@ -56,20 +56,20 @@ class Model:
 
     @property
     def identifier(self) -> str:
-        """The name of its library, and what names in C can begin with."""
+        """The name of its library, which is valid in C."""
         found = re.sub(r"\W", "_", self.name, flags=re.ASCII)
         return found if found[:1].isalpha() else f"of_{found}"
 
     @property
     def about(self) -> dict[str, str]:
-        """What modelDescription.xml says of its origin."""
-        said = self.origin._asdict()
-        del said["citation"]
-        return {name: text for name, text in said.items() if text}
+        """Attributes of modelDescription.xml about its origin."""
+        texts = self.origin._asdict()
+        del texts["citation"]
+        return {name: text for name, text in texts.items() if text}
 
     @property
     def description(self) -> str:
-        """What modelDescription.xml says of it."""
+        """The description in modelDescription.xml."""
         return ". ".join(filter(None, (self.summary, self.origin.citation)))
 
 
@@ -78,9 +78,9 @@ class Definition(Model):
     """A component.
 
     Attributes:
-        parameters: what its parameters mean to the equations, all but `h_max`.
-        noisy: the names of the outputs that have noise.
-        behaviour: how it runs.
+        parameters: its parameters but `h_max`, as a group of the equations.
+        noisy: names of the outputs that have noise.
+        behaviour: its hooks and constants.
 
     """
 
@@ -91,74 +91,81 @@ class Definition(Model):
 
 @cache
 def define(name: str, module: ModuleType) -> Definition:
-    """What a module says of a component, the same each time.
-
-    Args:
-        name: of the component.
-        module: that says it all.
+    """Return the definition of a component.
 
     Raises:
-        Misdeclared: it is no component.
+        Misdeclared: it is not a component.
 
     """
-    said = read_behaviour(module)
-    inputs = declared(said.inputs, "input")
-    direct = (*inputs, *([TIME.name] if said.takes("outputs", "t") else []))
-    if not said.takes("outputs", "inputs"):
+    behaviour = read_behaviour(module)
+    inputs = declared(behaviour.inputs, "input")
+    direct = (*inputs, *([TIME.name] if behaviour.takes("outputs", "t") else []))
+    if not behaviour.takes("outputs", "inputs"):
         direct = direct[len(inputs) :]
     outputs = declared(
-        said.outputs, "output", direct, tuple(inputs) if said.takes("start", "inputs") else ()
+        behaviour.outputs,
+        "output",
+        direct,
+        tuple(inputs) if behaviour.takes("start", "inputs") else (),
     )
-    own = ParameterSet(said.parameters, [*chain(*declared(said.parameters, "parameter").values())])
+    own = ParameterSet(
+        behaviour.parameters, [*chain(*declared(behaviour.parameters, "parameter").values())]
+    )
     ports = (
         *chain(*inputs.values()),
-        *_fed_through(said, outputs, inputs),
+        *_fed_through(behaviour, outputs, inputs),
         *own.ports,
-        *([] if said.h_max is None else [largest_step(said.h_max)]),
+        *([] if behaviour.h_max is None else [largest_step(behaviour.h_max)]),
     )
-    _hold_apart(said, ports)
+    _check_names(behaviour, ports)
     check_enumerations(ports)
     summary = (module.__doc__ or name).strip().partition("\n")[0].rstrip(".")
     origin = Origin(*(str(getattr(module, f"__{field}__", "")) for field in Origin._fields))
     for place, text in {"its docstring": summary, **origin._asdict()}.items():
         if not is_line(text.replace("\n", " ").replace("\t", " ")):
             raise Misdeclared(f"{place} is {text!r:.40}; write it without control characters")
-    noisy = tuple(port.name for port in outputs[said.noisy]) if said.noisy else ()
-    experiment = DefaultExperiment(said.stop, said.step)
-    return Definition(name, summary, origin, ports, experiment, own, noisy, said)
+    noisy = tuple(port.name for port in outputs[behaviour.noisy]) if behaviour.noisy else ()
+    experiment = DefaultExperiment(behaviour.stop, behaviour.step)
+    return Definition(name, summary, origin, ports, experiment, own, noisy, behaviour)
 
 
 def _fed_through(
-    said: Behaviour, outputs: Mapping[str, tuple[Port, ...]], inputs: Mapping[str, tuple[Port, ...]]
+    behaviour: Behaviour,
+    outputs: Mapping[str, tuple[Port, ...]],
+    inputs: Mapping[str, tuple[Port, ...]],
 ) -> Iterator[Port]:
-    """The outputs, with the names of ports where the fields of the inputs stood."""
+    """Yield the outputs, with dependencies on ports in place of fields of the inputs."""
     names = {field: [port.name for port in ports] for field, ports in inputs.items()}
     names |= {name: [name] for found in [*names.values()] for name in found}
     names[TIME.name] = [TIME.name]
     for field, ports in outputs.items():
         for port in ports:
-            place = (said.outputs.__name__, field)
+            place = (behaviour.outputs.__name__, field)
             for one in (*port.feedthrough, *(port.initially or ())):
                 if one not in names:
                     why = f"depends on {one!r}; there are {', '.join(names)}"
                     raise Misdeclared(f"{'.'.join(place)} {why}", *place)
             direct = tuple(name for one in port.feedthrough for name in names[one])
-            if said.is_sampled and not {*direct} - {TIME.name}:
+            if behaviour.is_sampled and not {*direct} - {TIME.name}:
                 why = "is sampled with the inputs, so it has feedthrough; leave out feedthrough=()"
                 raise Misdeclared(f"{'.'.join(place)} {why}", *place)
             initial = (name for one in port.initially or () for name in names[one])
             yield replace(
                 port,
-                variability="discrete" if said.is_sampled else port.variability,
+                variability="discrete" if behaviour.is_sampled else port.variability,
                 feedthrough=direct,
                 initially=tuple(name for name in initial if name not in direct),
             )
 
 
-def _hold_apart(said: Behaviour, ports: tuple[Port, ...]) -> None:
-    """Hold the names of ports apart, also from those that a component has anyway."""
+def _check_names(behaviour: Behaviour, ports: tuple[Port, ...]) -> None:
+    """Refuse two ports of one name, and names that every component has."""
     taken = dict.fromkeys((FAULT.name, TIME.name), "every component")
-    made = {"input": said.inputs, "output": said.outputs, "parameter": said.parameters}
+    made = {
+        "input": behaviour.inputs,
+        "output": behaviour.outputs,
+        "parameter": behaviour.parameters,
+    }
     for port in ports:
         name = made[port.causality].__name__
         if port.name in taken:
@@ -168,7 +175,7 @@ def _hold_apart(said: Behaviour, ports: tuple[Port, ...]) -> None:
 
 
 def check_enumerations(ports: tuple[Port, ...]) -> None:
-    """Refuse types of one name that are two, or whose name something else has.
+    """Refuse two enumerations of one name, and enumerations with the name of a port or unit.
 
     Raises:
         Misdeclared: there is one.
@@ -178,5 +185,5 @@ def check_enumerations(ports: tuple[Port, ...]) -> None:
     taken |= {unit_of(port.unit).type_name: port.unit for port in ports if port.unit}
     for port in ports:
         if port.enumeration and taken.setdefault(port.enumeration, port.choices) != port.choices:
-            why = f"is the name of something else in the FMU, besides that of {port.name}'s choices"
+            why = f"is the name of {port.name}'s choices, and of something else in the FMU"
             raise Misdeclared(f"{port.enumeration} {why}: rename it", port.enumeration)

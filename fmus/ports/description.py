@@ -1,62 +1,66 @@
-"""modelDescription.xml of FMI 2.0 for both kinds of component, and what all versions say alike.
+"""modelDescription.xml of both versions of FMI, and buildDescription.xml.
 
-PythonFMU and we ourselves write a description's frame each in their own way; what is in it follows
-from the ports.
+The root element is written by PythonFMU or here; its content follows from the ports.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import count
+from dataclasses import replace
+from itertools import count, groupby
+from operator import itemgetter
 from typing import NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from auv_fmu import __version__
 from fmus.ports.definition import DefaultExperiment, Model
-from fmus.ports.port import FAULT, Port, Value
+from fmus.ports.port import FAULT, TIME, Port, Value
 from fmus.ports.units import unit_of
 
-#: Whether steps may differ in size.
+#: Attribute that is true if steps may differ in size.
 _ANY_STEP = "canHandleVariableCommunicationStepSize"
 
-#: What an FMU can do, where all versions of FMI have the same word for it.
-CAPABILITIES = {
+#: Capabilities with the same name in all versions of FMI.
+_CAPABILITIES = {
     "needsExecutionTool": "false",
     "canBeInstantiatedOnlyOncePerProcess": "false",
     _ANY_STEP: "true",
 }
 
-#: Statuses that messages are logged with and that have a category.
+#: The source file that includes all others, by version of FMI.
+SOURCES: Mapping[str, str] = {"2": "fmi2.c", "3": "fmi3.c"}
+
+#: Statuses of messages that have a category.
 _LOGGED = ("Warning", "Discard", "Error", "Fatal")
 
-#: How a variable gets its value at the start time; the standard forbids to say so of others.
+#: Attribute `initial` by causality; the standard forbids it for other causalities.
 _INITIAL = {"output": "calculated", "parameter": "exact"}
 
 
 class Dependency(NamedTuple):
-    """What an output depends on: all by numbers, in FMI 2.0 an index, in FMI 3.0 a reference."""
+    """Dependencies of an output, by indices in FMI 2.0 and by value references in FMI 3.0."""
 
-    number: int  #: of the output
-    direct: list[int]  #: what its value depends on without a state between
-    initial: list[int] | None  #: what its value at the start time depends on; None: all there is
+    number: int  #: number of the output
+    direct: list[int]  #: variables that it depends on without a state in between
+    initial: list[int] | None  #: variables that its initial value depends on; None: on all
 
 
 def _literal(value: Value) -> str:
-    """A value as XML writes it."""
+    """Write a value as in XML."""
     if isinstance(value, bool):
         return str(value).lower()
-    # What is read back has the same bits. numpy's numbers have a repr of their own.
+    # repr keeps all bits; float() because numpy's numbers have another repr.
     return repr(float(value)).removesuffix(".0") if isinstance(value, float) else str(value)
 
 
-def capabilities_of(model: Model, said: Mapping[str, str]) -> dict[str, str]:
-    """What an FMU can do of what others can."""
-    return {**said, _ANY_STEP: str(model.experiment.takes_any_step).lower()}
+def _capabilities(model: Model, known: Mapping[str, str]) -> dict[str, str]:
+    """Return capabilities, with the one that depends on the model."""
+    return {**known, _ANY_STEP: str(model.experiment.takes_any_step).lower()}
 
 
-def root_of(version: str, model: Model, **identity: str) -> Element:
-    """The root of a description that no other tool has written, with guid or token."""
-    said = {
+def _root(version: str, model: Model, **identity: str) -> Element:
+    """Make the root of a description; `identity` is the guid or token."""
+    attributes = {
         "fmiVersion": version,
         "modelName": model.name,
         **identity,
@@ -65,18 +69,18 @@ def root_of(version: str, model: Model, **identity: str) -> Element:
         "generationTool": f"auv-fmu {__version__}",
         "variableNamingConvention": "structured",
     }
-    return Element("fmiModelDescription", said)
+    return Element("fmiModelDescription", attributes)
 
 
-def text(root: Element) -> bytes:
-    """A document, whose bytes depend only on its elements."""
+def document(root: Element) -> bytes:
+    """Write a document, whose bytes depend only on its elements."""
     indent(root)
     content: bytes = tostring(root, encoding="utf-8")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + content + b"\n"
 
 
-def variable_attributes(reference: int, port: Port) -> dict[str, str]:
-    """What is said of a variable apart from its values."""
+def _variable_attributes(reference: int, port: Port) -> dict[str, str]:
+    """Return the attributes of a variable that do not describe its values."""
     attributes = {
         "name": port.name,
         "valueReference": str(reference),
@@ -90,46 +94,46 @@ def variable_attributes(reference: int, port: Port) -> dict[str, str]:
 
 
 def value_attributes(port: Port) -> dict[str, str]:
-    """What is said of a variable's values."""
+    """Return the attributes of a variable's values."""
     declared = unit_of(port.unit).type_name if port.unit else port.enumeration
-    said = {"declaredType": declared, "unit": port.unit}
+    texts = {"declaredType": declared, "unit": port.unit}
     values = {
         "start": port.start,
         "min": port.minimum,
         "max": port.maximum,
     }
     return {
-        **{name: text for name, text in said.items() if text},
+        **{name: text for name, text in texts.items() if text},
         **{name: _literal(value) for name, value in values.items() if value is not None},
     }
 
 
-def units_of(ports: Sequence[Port]) -> list[str]:
-    """The units that ports have, each once."""
+def _units(ports: Sequence[Port]) -> list[str]:
+    """Return the units of ports, each once."""
     return sorted({port.unit for port in ports if port.unit})
 
 
 def unit_definitions(units: Sequence[str]) -> Element:
-    """Units by the base units that they are made of."""
+    """Write units in terms of base units."""
     definitions = Element("UnitDefinitions")
     for unit in units:
-        defined, said = SubElement(definitions, "Unit", name=unit), unit_of(unit)
-        if said.exponents is None:
+        defined, parsed = SubElement(definitions, "Unit", name=unit), unit_of(unit)
+        if parsed.exponents is None:
             continue
-        base = {name: str(exponent) for name, exponent in said.exponents.items()}
-        if said.factor != 1.0:
-            base["factor"] = _literal(said.factor)
-        if said.offset:
-            base["offset"] = _literal(said.offset)
-        # Some readers cannot do with an element without attributes; one is the default.
+        base = {name: str(exponent) for name, exponent in parsed.exponents.items()}
+        if parsed.factor != 1.0:
+            base["factor"] = _literal(parsed.factor)
+        if parsed.offset:
+            base["offset"] = _literal(parsed.offset)
+        # Some tools cannot read an element without attributes; a factor of 1 is the default.
         SubElement(defined, "BaseUnit", base or {"factor": "1"})
     return definitions
 
 
-def type_definitions(ports: Sequence[Port], add: Callable[..., Element]) -> Element:
-    """The types of units and of enumerations; `add` makes the element of one."""
+def _type_definitions(ports: Sequence[Port], add: Callable[..., Element]) -> Element:
+    """Write the types of units and enumerations; `add` adds the element of a type."""
     definitions = Element("TypeDefinitions")
-    for unit in units_of(ports):
+    for unit in _units(ports):
         name = unit_of(unit).type_name
         add(definitions, "Real", name, quantity=name, unit=unit)
     for name, choices in {port.enumeration: port.choices for port in ports if port.choices}.items():
@@ -142,9 +146,9 @@ def type_definitions(ports: Sequence[Port], add: Callable[..., Element]) -> Elem
 def dependencies(
     ports: Sequence[Port], numbers: Iterable[int] | None = None
 ) -> Iterator[Dependency]:
-    """What each output depends on: its direct feedthrough, and at the start the parameters too.
+    """Yield the dependencies of outputs: direct feedthrough, and at the start also parameters.
 
-    Without other numbers for all ports, they are counted from one, as FMI 2.0 does.
+    By default ports are numbered from one, as in FMI 2.0.
     """
     places = {port.name: place for port, place in zip(ports, numbers or count(1))}
     parameters = [places[port.name] for port in ports if port.causality == "parameter"]
@@ -152,7 +156,7 @@ def dependencies(
         if port.causality == "output":
             # FMI 2.0 has no variable for the time.
             direct = [places[name] for name in port.feedthrough if name in places]
-            # fault is false at the start, unless what is set is refused.
+            # fault is false at the start, unless a value is refused.
             initial: list[int] | None = None
             if port == FAULT:
                 initial = []
@@ -162,8 +166,8 @@ def dependencies(
             yield Dependency(places[port.name], direct, initial)
 
 
-def dependent_on(known: Sequence[int] | None) -> dict[str, str]:
-    """What is said of an output that depends on variables at these places; None: on all."""
+def _dependent_on(known: Sequence[int] | None) -> dict[str, str]:
+    """Return the attributes of an output that depends on these variables; None: on all."""
     if known is None:
         return {}
     return {
@@ -172,8 +176,8 @@ def dependent_on(known: Sequence[int] | None) -> dict[str, str]:
     }
 
 
-def log_categories(fmi: str) -> Element:
-    """The categories of messages, with the statuses of a version of FMI such as `fmi2`."""
+def _log_categories(fmi: str) -> Element:
+    """Write the categories of messages; `fmi` is the prefix of statuses, such as `fmi2`."""
     categories = Element("LogCategories")
     for status in _LOGGED:
         described = f"Log messages with {fmi}{status} status."
@@ -182,62 +186,53 @@ def log_categories(fmi: str) -> Element:
     return categories
 
 
-def default_experiment(said: DefaultExperiment) -> Element:
-    """The experiment that a host runs if nothing else is asked for."""
-    times = {"startTime": said.start, "stopTime": said.stop, "stepSize": said.step}
+def _default_experiment(one: DefaultExperiment) -> Element:
+    """Write the default experiment."""
+    times = {"startTime": one.start, "stopTime": one.stop, "stepSize": one.step}
     return Element("DefaultExperiment", {name: str(time) for name, time in times.items()})
 
 
 # FMI 2.0
 
-_CAPABILITIES = {
-    **CAPABILITIES,
+_CAPABILITIES_2 = {
+    **_CAPABILITIES,
     "canGetAndSetFMUstate": "true",
     "canSerializeFMUstate": "true",
     "canNotUseMemoryManagementFunctions": "true",
 }
 
-#: The file of a component's sources that includes all others.
-SOURCE = "fmi2.c"
-
 
 def fmi2_description(model: Model, guid: str) -> bytes:
-    """The description of a model that is a library with the name of its identifier.
-
-    Args:
-        model: that it is about.
-        guid: as the library knows it.
-
-    """
-    root = root_of("2.0", model, guid=guid)
+    """Write the description of a model whose library contains the GUID."""
+    root = _root("2.0", model, guid=guid)
     implementation = SubElement(root, "CoSimulation", modelIdentifier=model.identifier)
-    SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCE)
-    root.extend((log_categories("fmi2"), default_experiment(model.experiment)))
+    SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCES["2"])
+    root.extend((_log_categories("fmi2"), _default_experiment(model.experiment)))
     SubElement(root, "ModelVariables")
     SubElement(root, "ModelStructure")
     complete(root, (*model.ports, FAULT))
-    implementation.attrib.update(capabilities_of(model, implementation.attrib))
-    return text(root)
+    implementation.attrib.update(_capabilities(model, implementation.attrib))
+    return document(root)
 
 
 def complete(root: Element, ports: Sequence[Port]) -> Element:
-    """Fill in what the ports of a component say.
+    """Fill in the elements that depend on the ports.
 
     Args:
         root: fmiModelDescription with the elements CoSimulation, ModelVariables and
             ModelStructure.
-        ports: all, in the order of their value references.
+        ports: all ports, in the order of their value references.
 
     """
     implementation = root.find("CoSimulation")
     variables = root.find("ModelVariables")
     structure = root.find("ModelStructure")
     assert implementation is not None and variables is not None and structure is not None
-    implementation.attrib.update(_CAPABILITIES)
+    implementation.attrib.update(_CAPABILITIES_2)
     variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
     structure[:] = _structure(ports)
-    types = type_definitions(ports, _add_type)
-    if units := units_of(ports):
+    types = _type_definitions(ports, _add_type)
+    if units := _units(ports):
         root.insert(1, unit_definitions(units))
     if len(types):
         root.insert(1 + bool(units), types)
@@ -245,19 +240,134 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
 
 
 def _variable(reference: int, port: Port) -> Element:
-    variable = Element("ScalarVariable", variable_attributes(reference, port))
+    variable = Element("ScalarVariable", _variable_attributes(reference, port))
     SubElement(variable, port.type, value_attributes(port))
     return variable
 
 
-def _add_type(parent: Element, kind: str, name: str, **said: str) -> Element:
-    return SubElement(SubElement(parent, "SimpleType", name=name), kind, said)
+def _add_type(parent: Element, kind: str, name: str, **attributes: str) -> Element:
+    return SubElement(SubElement(parent, "SimpleType", name=name), kind, attributes)
 
 
 def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
-    """Outputs with their direct feedthrough; InitialUnknowns with the parameters as well."""
+    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
     outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
     for output in dependencies(ports):
         for parent, known in ((outputs, output.direct), (initial_unknowns, output.initial)):
-            SubElement(parent, "Unknown", dependent_on(known), index=str(output.number))
+            SubElement(parent, "Unknown", _dependent_on(known), index=str(output.number))
     return outputs, initial_unknowns
+
+
+# FMI 3.0
+
+#: Names of types in FMI 3.0.
+TYPES = {
+    "Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration",
+}  # fmt: skip
+
+_CAPABILITIES_3 = {**_CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializeFMUState": "true"}
+
+#: The platforms in the build description.
+_PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin")
+
+
+def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
+    """Write the description of a model whose library contains the token.
+
+    With `arrays`, vectors and matrices of one unit are array variables.
+    """
+    ports = (*model.ports, FAULT, TIME)
+    variables = variables_of(ports, arrays)
+    root = _root("3.0", model, instantiationToken=token)
+    capabilities = _capabilities(model, _CAPABILITIES_3)
+    SubElement(root, "CoSimulation", capabilities, modelIdentifier=model.identifier)
+    root.extend(
+        (
+            unit_definitions(_units(ports)),
+            _type_definitions(ports, _add_type_3),
+            _log_categories("fmi3"),
+            _default_experiment(model.experiment),
+            _variables(variables),
+            _structure_3(variables),
+        )
+    )
+    return document(root)
+
+
+def fmi3_build_description(name: str) -> bytes:
+    """Write the build description: one file to compile, with any compiler and no options."""
+    root = Element("fmiBuildDescription", fmiVersion="3.0")
+    for platform in _PLATFORMS:
+        built = SubElement(root, "BuildConfiguration", modelIdentifier=name, platform=platform)
+        sources = SubElement(built, "SourceFileSet", language="C99")
+        SubElement(sources, "SourceFile", name=SOURCES["3"])
+        if platform.endswith("-linux"):
+            # On Linux the mathematical library is separate.
+            SubElement(built, "Library", name="m", external="true")
+    return document(root)
+
+
+def _add_type_3(parent: Element, kind: str, name: str, **attributes: str) -> Element:
+    return SubElement(parent, f"{TYPES[kind]}Type", {"name": name, **attributes})
+
+
+class _Variable(NamedTuple):
+    """A scalar or an array; an array has the value reference of its first element."""
+
+    reference: int
+    port: Port
+    elements: Sequence[Port]
+
+
+def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]:
+    """Return ports as variables; with `arrays`, the ports of an array are one variable."""
+    if not arrays:
+        ports = [replace(port, array=None) for port in ports]
+    names = {port.name: port.array.name if port.array else port.name for port in ports}
+    keyed = [(names[port.name], place, port) for place, port in enumerate(ports, start=1)]
+    variables = []
+    for name, found in groupby(keyed, itemgetter(0)):
+        members = [*found]
+        _, reference, first = members[0]
+        elements = [port for _, _, port in members]
+        described = first.array.description if first.array else first.description
+        direct = tuple(_names(names, (name for port in elements for name in port.feedthrough)))
+        initial = _names(names, (name for port in elements for name in port.initially or ()))
+        later = tuple(one for one in initial if one not in direct)
+        whole = replace(
+            first,
+            name=name,
+            description=described,
+            feedthrough=direct,
+            initially=None if first.initially is None else later,
+        )
+        variables.append(_Variable(reference, whole, elements))
+    return variables
+
+
+def _names(names: Mapping[str, str], found: Iterable[str]) -> dict[str, None]:
+    """Return the names of variables for names of scalars, each once."""
+    return dict.fromkeys(names.get(one, one) for one in found)
+
+
+def _variables(variables: Sequence[_Variable]) -> Element:
+    root = Element("ModelVariables")
+    for reference, port, elements in variables:
+        attributes = {**_variable_attributes(reference, port), **value_attributes(port)}
+        if port.start is not None:
+            attributes["start"] = " ".join(value_attributes(one)["start"] for one in elements)
+        variable = SubElement(root, TYPES[port.type], attributes)
+        for size in port.array.shape if port.array else ():
+            SubElement(variable, "Dimension", start=str(size))
+    return root
+
+
+def _structure_3(variables: Sequence[_Variable]) -> Element:
+    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
+    outputs = [*dependencies([one.port for one in variables], [one.reference for one in variables])]
+    structure = Element("ModelStructure")
+    for name, on in (("Output", "direct"), ("InitialUnknown", "initial")):
+        for output in outputs:
+            known = _dependent_on(getattr(output, on))
+            SubElement(structure, name, known, valueReference=str(output.number))
+    return structure

@@ -1,4 +1,4 @@
-"""Ports from the fields of a class: what `Annotated` says of a field, and what follows from it."""
+"""Ports from the fields of a class, which `Annotated` describes."""
 
 from __future__ import annotations
 
@@ -18,21 +18,21 @@ from fmus.ports.port import Array, Misdeclared, Port
 class _Part(NamedTuple):
     """One number of a field."""
 
-    member: str  #: what it is called within the field; empty: it is all of it
-    name: str  #: of its port
+    member: str  #: its name within the field; empty if it is the whole field
+    name: str  #: name of its port
     unit: str
     type: Any
     start: Any
 
 
-#: What FMI calls the types of numbers, and where a number starts if nothing is said.
+#: Names of types in FMI, and default start values.
 _TYPES: dict[Any, tuple[str, Any]] = {
     float: ("Real", 0.0),
     int: ("Integer", 0),
     bool: ("Boolean", False),
 }
 
-#: What is said only of some.
+#: Attributes that only one causality may have.
 _ONLY = {"feedthrough": "output", "initially": "output", "tunable": "parameter"}
 
 #: An input, or a group of them, in `feedthrough`.
@@ -47,17 +47,17 @@ def declared(
     prefix: str = "",
     given: Any = None,
 ) -> dict[str, tuple[Port, ...]]:
-    """The ports of each field of a class, by the names of its fields.
+    """Return the ports of each field of a class, by the names of its fields.
 
     Args:
         made: the class, a NamedTuple.
         causality: of the ports: `input`, `output` or `parameter`.
-        direct, initial: `feedthrough` and `initially` of outputs that do not say it.
-        prefix: what the names of the ports begin with.
-        given: the start values, if they are others than those of the class.
+        direct, initial: defaults of `feedthrough` and `initially` of outputs.
+        prefix: prefix of the names of the ports.
+        given: start values, if they differ from the defaults of the class.
 
     Raises:
-        Misdeclared: a field is wrong, or says too little.
+        Misdeclared: a field is invalid or incomplete.
 
     """
     starts = dict(made._field_defaults) if given is None else given._asdict()
@@ -72,20 +72,20 @@ def declared(
             below = declared(inner, causality, direct, initial, before, start)
             fields[field] = tuple(chain(*below.values()))
             continue
-        said = _said(notes, causality, place, inner)
+        variable = _said(notes, causality, place, inner)
         check_type(hint, *place)
-        parts = list(_parts(inner, notes, said, start, prefix, place))
+        parts = list(_parts(inner, notes, variable, start, prefix, place))
         if causality == "parameter" and any(part.start is None for part in parts):
             raise _wrong(place, "has no default value, which a parameter starts with")
         if causality == "output":
-            if said.feedthrough is None:
-                said = replace(said, feedthrough=direct)
-            if said.initially is None:
-                said = replace(said, initially=initial)
-        ports = [_port(causality, said, part, place) for part in parts]
-        if len({part.unit for part in parts}) == 1 and "{}" not in (said.name or ""):
+            if variable.feedthrough is None:
+                variable = replace(variable, feedthrough=direct)
+            if variable.initially is None:
+                variable = replace(variable, initially=initial)
+        ports = [_port(causality, variable, part, place) for part in parts]
+        if len({part.unit for part in parts}) == 1 and "{}" not in (variable.name or ""):
             shape = _shape(inner, notes, place)[0]
-            array = Array(prefix + (said.name or field), said.description, shape)
+            array = Array(prefix + (variable.name or field), variable.description, shape)
             ports = [replace(port, array=array if shape else None) for port in ports]
         fields[field] = tuple(ports)
     return fields
@@ -96,44 +96,44 @@ def _wrong(place: tuple[str, ...], why: str) -> Misdeclared:
 
 
 def _prefix(notes: tuple[Any, ...], field: str, place: tuple[str, ...]) -> str:
-    """What the names begin with of the fields of a NamedTuple that is a field."""
+    """Return the prefix of names for the fields of a NamedTuple that is a field itself."""
     found = [note for note in notes if isinstance(note, Variable)]
     if found and found != [Variable(name=found[0].name)]:
-        raise _wrong(place, "is a NamedTuple, of which a Variable says only the name")
+        raise _wrong(place, "is a NamedTuple, and its Variable may have only a name")
     name = found[0].name if found else None
     return f"{field}." if name is None else f"{name}." if name else ""
 
 
 def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner: Any) -> Variable:
-    """What a field says of its ports, if that can be said of them."""
+    """Return the Variable of a field, with its members; refuse an invalid one."""
     found = [note for note in notes if isinstance(note, Variable)]
     if len(found) != 1:
         example = f'{place[-1]}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
         raise _wrong(place, f"has no unit and no description; write {example}")
-    [said] = found
+    [variable] = found
     for name, of in _ONLY.items():
-        if getattr(said, name) not in (None, False) and causality != of:
+        if getattr(variable, name) not in (None, False) and causality != of:
             raise _wrong(place, f"is no {of}, and {name} is for {of}s")
-    if causality == "output" and (said.minimum, said.maximum) != (None, None):
+    if causality == "output" and (variable.minimum, variable.maximum) != (None, None):
         raise _wrong(place, "is an output; minimum and maximum are for inputs and parameters")
     for name in ("feedthrough", "initially"):
-        names = getattr(said, name)
+        names = getattr(variable, name)
         if names is not None and not _are_different(names, _is_source):
             raise _wrong(place, f"has the {name} {names!r:.40}; write a tuple of different names")
-    if isinstance(said.unit, Mapping):
-        if said.members:
+    if isinstance(variable.unit, Mapping):
+        if variable.members:
             raise _wrong(place, "has its members twice: with their units, and without")
-        said = replace(said, members=tuple(said.unit))
-    if not _are_different(said.members, _is_member):
-        why = f"has the members {said.members!r:.40}; write a tuple of different names"
+        variable = replace(variable, members=tuple(variable.unit))
+    if not _are_different(variable.members, _is_member):
+        why = f"has the members {variable.members!r:.40}; write a tuple of different names"
         raise _wrong(place, why)
-    if not isinstance(said.description, str):
-        raise _wrong(place, f"has the description {said.description!r:.40}; write a text")
-    return said
+    if not isinstance(variable.description, str):
+        raise _wrong(place, f"has the description {variable.description!r:.40}; write a text")
+    return variable
 
 
 def _are_different(names: object, is_one: Any) -> bool:
-    """Whether something is a tuple of names of a kind, each once."""
+    """Return True for a tuple of different names of a kind."""
     return isinstance(names, tuple) and all(map(is_one, names)) and len({*names}) == len(names)
 
 
@@ -148,7 +148,7 @@ def _is_member(name: object) -> bool:
 
 
 def _word(hint: Any) -> str:
-    """A type as it is written."""
+    """Return the text of a type."""
     if hint in (Vector, Matrix):
         return f"{hint.__name__}, {'3' if hint is Vector else '2, 3'}"
     return word(hint)
@@ -157,26 +157,26 @@ def _word(hint: Any) -> str:
 def _parts(
     hint: Any,
     notes: tuple[Any, ...],
-    said: Variable,
+    variable: Variable,
     start: Any,
     prefix: str,
     place: tuple[str, ...],
 ) -> Iterator[_Part]:
-    """The numbers of a field, in their order."""
+    """Yield the numbers of a field in order."""
     shape, number = _shape(hint, notes, place)
-    if said.members and (len(shape) != 1 or shape[0] != len(said.members)):
+    if variable.members and (len(shape) != 1 or shape[0] != len(variable.members)):
         size = " x ".join(map(str, shape)) or "one"
-        raise _wrong(place, f"has {len(said.members)} members for {size} numbers")
-    members = said.members or [",".join(map(str, at)) for at in _places(shape)]
+        raise _wrong(place, f"has {len(variable.members)} members for {size} numbers")
+    members = variable.members or [",".join(map(str, at)) for at in _places(shape)]
     starts = [None] * len(members) if start is None else list(_flat(start, shape, place))
-    base = prefix + (place[-1] if said.name is None else said.name)
+    base = prefix + (place[-1] if variable.name is None else variable.name)
     for member, first in zip(members, starts):
-        unit = said.unit[member] if isinstance(said.unit, Mapping) else said.unit
-        yield _Part(str(member), _named(base, member, said.members), unit, number, first)
+        unit = variable.unit[member] if isinstance(variable.unit, Mapping) else variable.unit
+        yield _Part(str(member), _named(base, member, variable.members), unit, number, first)
 
 
 def _named(base: str, member: str | int, members: tuple[str | int, ...]) -> str:
-    """The name of one member of a group."""
+    """Return the name of a member of a group."""
     if "{}" in base:
         return base.replace("{}", str(member))
     if member == "":
@@ -187,7 +187,7 @@ def _named(base: str, member: str | int, members: tuple[str | int, ...]) -> str:
 def _shape(
     hint: Any, notes: tuple[Any, ...], place: tuple[str, ...]
 ) -> tuple[tuple[int, ...], Any]:
-    """How many numbers a type has along each dimension, and of which type."""
+    """Return the sizes of a type along each dimension, and the type of its numbers."""
     if hint in (Vector, Matrix):
         return sizes_in(notes), float
     if get_origin(hint) is tuple:
@@ -202,7 +202,7 @@ def _shape(
 
 
 def _places(shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
-    """The indices of all numbers, from one."""
+    """Yield the indices of all numbers, from one."""
     if not shape:
         yield ()
         return
@@ -211,7 +211,7 @@ def _places(shape: tuple[int, ...]) -> Iterator[tuple[int, ...]]:
 
 
 def _flat(start: Any, shape: tuple[int, ...], place: tuple[str, ...]) -> Iterator[Any]:
-    """The numbers of a start value that has this shape."""
+    """Yield the numbers of a start value of this shape."""
     if not shape:
         yield start
     elif not isinstance(start, tuple) or len(start) != shape[0]:
@@ -221,29 +221,29 @@ def _flat(start: Any, shape: tuple[int, ...], place: tuple[str, ...]) -> Iterato
             yield from _flat(part, shape[1:], place)
 
 
-def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -> Port:
-    kind, start, choices = _meant(part, place)
+def _port(causality: str, variable: Variable, part: _Part, place: tuple[str, ...]) -> Port:
+    kind, start, choices = _fmi_type(part, place)
     if kind != "Real" and part.unit != "1":
         raise _wrong(place, f"is of the type {_word(part.type)}; only a float has a unit")
-    variability = "tunable" if said.tunable else "fixed"
+    variability = "tunable" if variable.tunable else "fixed"
     if causality != "parameter":
         variability = "continuous" if kind == "Real" else "discrete"
-    label = "" if said.name and "{}" in said.name else part.member
+    label = "" if variable.name and "{}" in variable.name else part.member
     try:
         port = Port(
             part.name,
             causality,
             variability,
             kind,
-            ": ".join(filter(None, (said.description, label))),
+            ": ".join(filter(None, (variable.description, label))),
             (part.unit or None) if kind == "Real" else None,
             start,
-            said.minimum,
-            said.maximum,
+            variable.minimum,
+            variable.maximum,
             choices,
             part.type.__name__ if choices else "",
-            tuple(name.replace("{}", part.member) for name in said.feedthrough or ()),
-            tuple(name.replace("{}", part.member) for name in said.initially or ()),
+            tuple(name.replace("{}", part.member) for name in variable.feedthrough or ()),
+            tuple(name.replace("{}", part.member) for name in variable.initially or ()),
         )
         port.checked(start)
     except Misdeclared as error:
@@ -253,8 +253,8 @@ def _port(causality: str, said: Variable, part: _Part, place: tuple[str, ...]) -
     return replace(port, start=None) if causality == "output" else port
 
 
-def _meant(part: _Part, place: tuple[str, ...]) -> tuple[str, Any, dict[str, int]]:
-    """FMI's type of a number, its start value, and its choices."""
+def _fmi_type(part: _Part, place: tuple[str, ...]) -> tuple[str, Any, dict[str, int]]:
+    """Return FMI's type of a number, its start value, and its choices."""
     number, start = part.type, part.start
     if number in _TYPES:
         kind, zero = _TYPES[number]

@@ -1,4 +1,4 @@
-"""Flat values of ports and the groups that equations take and give, each made from the other."""
+"""Conversion between flat values of ports and the groups of the equations."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Nothing(NamedTuple):
 
 
 def slices(ports: Sequence[Port]) -> dict[str, slice]:
-    """Where each group of neighbouring ports lies among their values."""
+    """Return the slice of each group of neighbouring ports among their values."""
     found: dict[str, slice] = {}
     start = 0
     for group, members in groupby(ports, lambda port: group_name(port.name)):
@@ -42,12 +42,12 @@ def slices(ports: Sequence[Port]) -> dict[str, slice]:
 
 
 def hints_of(owner: Any) -> dict[str, Any]:
-    """Types of the fields of a class, or of the arguments of a function, with their sizes."""
+    """Return the types of a class's fields, or of a function's arguments, with their sizes."""
     return get_type_hints(owner, include_extras=True)
 
 
 def parts_of(hint: Any) -> list[Any] | None:
-    """The types of the elements of a tuple, a vector, a matrix or a NamedTuple; None: a number."""
+    """Return the types of a group's elements; None if the type is a number."""
     hint, notes = split(hint)
     sizes = sizes_in(notes)
     if hint is Vector and sizes:
@@ -66,17 +66,17 @@ def _parts_of_record(made: Any) -> list[Any]:
 
 
 def is_record(hint: Any) -> bool:
-    """Whether a type is a NamedTuple."""
+    """Return True for a NamedTuple."""
     return is_class(hint, tuple) and hasattr(hint, "_fields")
 
 
 def is_class(hint: Any, base: type) -> bool:
-    """Whether a type is a class, and no `tuple[float]`, that is made from a base."""
+    """Return True for a subclass of a base, but not for a generic such as `tuple[float]`."""
     return isinstance(hint, type) and get_origin(hint) is None and issubclass(hint, base)
 
 
 def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
-    """A type without what is noted beside it, and that."""
+    """Split an annotated type into the type and its notes."""
     if get_origin(hint) is Annotated:
         inner, *notes = get_args(hint)
         return inner, tuple(notes)
@@ -84,22 +84,22 @@ def split(hint: Any) -> tuple[Any, tuple[Any, ...]]:
 
 
 def sizes_in(notes: Iterable[Any]) -> tuple[int, ...]:
-    """The sizes of a vector or a matrix, of what is noted beside its type."""
+    """Return the sizes of a vector or a matrix, which are among the notes of its type."""
     return tuple(note for note in notes if type(note) is int)
 
 
 def class_of(hint: Any) -> Any:
-    """A type without what is noted beside it."""
+    """Return a type without its notes."""
     return split(hint)[0]
 
 
 def count_values(hint: Any) -> int:
-    """How many numbers a type holds."""
+    """Return the number of numbers in a type."""
     return sum(1 for _ in scalars_of(hint))
 
 
 def scalars_of(hint: Any) -> Iterator[Any]:
-    """The types of the numbers that a type holds, in their order."""
+    """Yield the types of the numbers in a type, in order."""
     parts = parts_of(hint)
     if parts is None:
         yield class_of(hint)
@@ -108,13 +108,22 @@ def scalars_of(hint: Any) -> Iterator[Any]:
         yield from scalars_of(part)
 
 
+def flat(value: Any) -> Iterator[Any]:
+    """Yield the numbers in nested tuples or lists, in order."""
+    if isinstance(value, (tuple, list)):
+        for part in value:
+            yield from flat(part)
+    else:
+        yield value
+
+
 def is_whole(hint: Any) -> bool:
-    """Whether a type is one of integers, or an enumeration of them."""
+    """Return True for an integer or an enumeration."""
     return hint is int or is_class(hint, IntEnum)
 
 
 def form(hint: Any) -> Any:
-    """A type that equals all others whose values are alike: with its sizes, without other notes."""
+    """Return a type with its sizes but without other notes, for comparison."""
     if get_origin(hint) is Annotated:
         inner, notes = split(hint)
         sizes = sizes_in(notes)
@@ -125,7 +134,7 @@ def form(hint: Any) -> Any:
 
 
 def word(hint: Any) -> str:
-    """A type as it is written."""
+    """Return the text of a type."""
     if hint is type(None):
         return "None"
     if get_origin(hint) is Annotated:
@@ -137,23 +146,20 @@ def word(hint: Any) -> str:
 
 
 def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
-    """Refuse a type that no group can have, or a part of it.
-
-    Args:
-        hint: the type.
-        place: the names of the class and of the field that have it.
-        around: classes that it is a part of.
+    """Refuse a type that is not in the language of equations, or has such a part.
 
     Raises:
-        Misdeclared: it is none of the language of equations.
+        Misdeclared: it is not in the language.
 
     """
     (kind, notes), where = split(hint), f"{'.'.join(place)} " if place else ""
     if kind in (Vector, Matrix):
         sizes = sizes_in(notes)
         if len(sizes) != (1 if kind is Vector else 2) or min(sizes) < 1:
-            said = f"{kind.__name__}, {'3' if kind is Vector else '2, 3'}{', ...' if notes else ''}"
-            why = f"is a {kind.__name__} without its size; write Annotated[{said}]"
+            example = (
+                f"{kind.__name__}, {'3' if kind is Vector else '2, 3'}{', ...' if notes else ''}"
+            )
+            why = f"is a {kind.__name__} without its size; write Annotated[{example}]"
             raise Misdeclared(f"{where}{why}", *place)
     elif is_class(kind, IntEnum):
         for name, member in kind.__members__.items():
@@ -176,7 +182,7 @@ def check_type(hint: Any, *place: str, around: tuple[Any, ...] = ()) -> None:
 
 
 def fields_of(made: Any) -> dict[str, Any]:
-    """The fields of a class and their types.
+    """Return the fields of a class and their types.
 
     Raises:
         Misdeclared: a type is not known.
@@ -193,18 +199,12 @@ def fields_of(made: Any) -> dict[str, Any]:
 
 
 def reals_first(ports: Sequence[Port]) -> list[Port]:
-    """Ports in the order of their values, in which a host can pass all Reals in one call."""
+    """Sort ports Reals first, the order of values, so that one call can pass all Reals."""
     return sorted(ports, key=lambda port: port.type != "Real")
 
 
 def unpacking(made: type[T], ports: Sequence[Port]) -> Callable[[Sequence[Value]], T]:
-    """A function that makes groups from the values of ports, Reals first.
-
-    Args:
-        made: NamedTuple with a number or a tuple a group, in the order of the ports.
-        ports: with one value each.
-
-    """
+    """Compile a function that makes a NamedTuple of groups from values of ports, Reals first."""
     if not ports:
         nothing = made()
         return lambda values: nothing
@@ -216,7 +216,7 @@ def unpacking(made: type[T], ports: Sequence[Port]) -> Callable[[Sequence[Value]
 
 
 def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
-    """The text of a value of a type, from the names of its numbers; the scope gets its classes."""
+    """Return the expression of a value from the names of its numbers; add classes to the scope."""
     parts, kind = parts_of(hint), class_of(hint)
     if parts is None:
         name = next(names)
@@ -224,7 +224,7 @@ def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
             return name
         members = f"members_{kind.__name__}"
         scope[members] = {int(member): member for member in kind}
-        # What is restored as an output need not be one.
+        # A restored output may be a number that is not a member.
         return f"{members}.get({name}, {name})"
     text = f"({''.join(f'{gathered(part, names, scope)}, ' for part in parts)})"
     if not is_class(kind, tuple):
@@ -235,14 +235,9 @@ def gathered(hint: Any, names: Iterator[str], scope: dict[str, Any]) -> str:
 
 
 def packed(given: Any, groups: Mapping[str, str]) -> str:
-    """The text of a list of the values of ports, Reals first, from those of groups.
+    """Return the expression of a list of values of ports, Reals first, from groups.
 
-    It raises OverflowError for an integer that FMI has no room for.
-
-    Args:
-        given: NamedTuple with a number or a tuple a group, in the order of the ports.
-        groups: the texts of its fields.
-
+    Its evaluation raises OverflowError for an integer of more than 32 bits.
     """
     hints = hints_of(given)
     texts = [pair for name, text in groups.items() for pair in scattered(hints[name], text)]
@@ -250,7 +245,7 @@ def packed(given: Any, groups: Mapping[str, str]) -> str:
 
 
 def scattered(hint: Any, text: str) -> Iterator[tuple[str, Any]]:
-    """The texts of the numbers in something, one or several alike each, and their type."""
+    """Yield expressions of the numbers in a value, each of one or several numbers of a type."""
     parts = parts_of(hint)
     if parts is None:
         scalar = class_of(hint)
@@ -267,10 +262,10 @@ def scattered(hint: Any, text: str) -> Iterator[tuple[str, Any]]:
 
 
 def whole(value: int) -> int:
-    """An integer, or a member of an enumeration, as an integer of 32 bits.
+    """Convert an integer, or a member of an enumeration, to an integer of 32 bits.
 
     Raises:
-        OverflowError: it has more.
+        OverflowError: it does not fit.
 
     """
     if not is_int32(value):
@@ -278,15 +273,15 @@ def whole(value: int) -> int:
     return int(value)
 
 
-#: What compiled functions may use.
+#: Names that compiled functions may use.
 SCOPE: Mapping[str, Any] = {"make": tuple.__new__, "whole": whole}
 
 
 def compiled(argument: str, body: str, scope: dict[str, Any]) -> Callable[[Any], Any]:
-    """A function from its text.
+    """Compile a function from its text.
 
-    It runs once a step in each component, and a loop over the groups costs several times the
-    same thing written out.
+    Such functions run once a step in each component, and a loop over the groups would take several
+    times as long as written-out code.
     """
     exec(f"def function({argument}):\n {body}", scope)
     function: Callable[[Any], Any] = scope["function"]
@@ -294,42 +289,25 @@ def compiled(argument: str, body: str, scope: dict[str, Any]) -> Callable[[Any],
 
 
 class ParameterSet(Generic[T]):
-    """Ports of the parameters that make one parameter set of the equations, number by number."""
+    """Ports of a parameter set of the equations, one for each number in it."""
 
     def __init__(self, made: type[T], ports: Sequence[Port]) -> None:
-        """Declare the set.
-
-        Args:
-            made: NamedTuple of the equations.
-            ports: for each number in it.
-
-        """
-        self._made = made
-        self.ports = tuple(ports)
+        """Declare the set, a NamedTuple of the equations, with a port for each number in it."""
+        self._made, self.ports = made, tuple(ports)
+        self._unpack = unpacking(made, self.ports)
 
     @property
     def paths(self) -> dict[str, tuple[str | int, ...]]:
-        """Where each parameter lies in the set, by its name: fields, and places in tuples."""
+        """Path of each parameter in the set, by its name: fields, and indices in tuples."""
         return dict(zip((port.name for port in self.ports), _places(self._made)))
 
     def of(self, values: Mapping[str, Value]) -> T:
-        """The parameter set with these values of its ports, by name."""
-        made: T = filled(self._made, iter([port.meaning(values[port.name]) for port in self.ports]))
-        return made
-
-
-def filled(hint: Any, values: Iterator[Any]) -> Any:
-    """A value of a type from its numbers."""
-    parts = parts_of(hint)
-    if parts is None:
-        return next(values)
-    elements = tuple(filled(part, values) for part in parts)
-    made = class_of(hint)
-    return tuple.__new__(made, elements) if is_class(made, tuple) else elements
+        """Make the parameter set from the values of its ports, by name."""
+        return self._unpack([values[port.name] for port in reals_first(self.ports)])
 
 
 def _places(hint: Any) -> Iterator[tuple[str | int, ...]]:
-    """Where the numbers of a type lie in it."""
+    """Yield the paths of the numbers in a type."""
     parts, kind = parts_of(hint), class_of(hint)
     if parts is None:
         yield ()

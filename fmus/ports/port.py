@@ -1,4 +1,4 @@
-"""One port of a component: what a description says of it, and what values it takes."""
+"""A port of a component: its description, and the values that it accepts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from auv_fmu.language.variable import POSITIVE, Refusal
 
 Value = Union[float, int, bool]
 
-#: Python's types of the values of FMI's types.
+#: Python types of values, by types of FMI.
 _TYPES = {"Real": (float, int), "Integer": (int,), "Boolean": (bool,), "Enumeration": (int,)}
 
 _LARGEST = sys.float_info.max
@@ -20,26 +20,26 @@ _LARGEST = sys.float_info.max
 #: A structured name of FMI, such as `tau.u` or `K[1,2]`.
 _NAME = re.compile(r"[A-Za-z_]\w*(\[\d+(,\d+)*\])?(\.[A-Za-z_]\w*(\[\d+(,\d+)*\])?)*", re.ASCII)
 
-#: What a line of text in XML cannot have.
+#: Characters that a line of text in XML cannot contain.
 _UNWRITABLE = re.compile("[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 class Misdeclared(TypeError):
-    """A component that cannot be; the text says why.
+    """An invalid declaration of a component; the text gives the reason.
 
     Attributes:
-        place: the names of a class or a function, and of its field, that it is about.
+        place: names of the class or function, and of its field.
 
     """
 
     def __init__(self, why: str, *place: str) -> None:
-        """Say what is wrong, and where."""
+        """Take the reason and the place."""
         self.place = place
         super().__init__(why)
 
 
 class Array(NamedTuple):
-    """What scalar variables are the elements of."""
+    """An array whose elements are scalar variables."""
 
     name: str
     description: str
@@ -55,16 +55,16 @@ class Port:
         causality: `input`, `output`, `parameter`, or `independent`, which is the time.
         variability: `continuous`, `discrete`, `fixed` or `tunable`.
         type: of FMI: `Real`, `Integer`, `Boolean` or `Enumeration`.
-        unit: of a Real, as :mod:`fmus.ports.units` reads it.
-        start: value before anything is set. Outputs have none.
+        unit: unit of a Real, in the form that :mod:`fmus.ports.units` reads.
+        start: value before anything is set; None for outputs.
         description: one line.
         minimum, maximum: inclusive bounds of a number.
-        choices: the values of an Enumeration by their names.
-        enumeration: what its type is called.
-        feedthrough: of an output, what it depends on without a state between: inputs, the time.
-        initially: of an output, inputs that its value at the start depends on besides; None: it
-            depends on all that is set.
-        array: that it is an element of, all of which have one unit; None: of none.
+        choices: values of an Enumeration by their names.
+        enumeration: name of the type of an Enumeration.
+        feedthrough: inputs, and the time, on which an output depends without a state in between.
+        initially: further inputs on which the initial value of an output depends; None if it
+            depends on everything that is set.
+        array: the array that it is an element of, if any; all its elements have one unit.
 
     """
 
@@ -84,7 +84,7 @@ class Port:
     array: Array | None = None
 
     def __post_init__(self) -> None:
-        """Refuse what no description of an FMU can say."""
+        """Refuse what the description of an FMU cannot express."""
         for why in self._flaws():
             raise Misdeclared(f"{self.name} {why}")
 
@@ -109,21 +109,21 @@ class Port:
             yield f"has the minimum {self.minimum!r:.40} above the maximum {self.maximum!r:.40}"
 
     def checked(self, value: Value) -> Value:
-        """The value, if this port can take it.
+        """Return a value, if this port can take it.
 
         Raises:
             Refusal: it is of another type, not finite, out of range, or not one of the choices.
 
         """
-        self.sound(value)
+        self.check_type(value)
         if self.minimum is not None and value < self.minimum:
             raise Refusal(f"{self.name} = {value:g}: must be at least {self.minimum:g}")
         if self.maximum is not None and value > self.maximum:
             raise Refusal(f"{self.name} = {value:g}: must be at most {self.maximum:g}")
         return value
 
-    def sound(self, value: Value) -> None:
-        """Refuse what is no value of this port, in whatever range it has.
+    def check_type(self, value: Value) -> None:
+        """Refuse a value that has another type, or is not finite, or is not a choice.
 
         Raises:
             Refusal: it is of another type, not finite, or not one of the choices.
@@ -140,18 +140,14 @@ class Port:
             known = ", ".join(f"{number:d} ({name})" for name, number in self.choices.items())
             raise Refusal(f"{self.name} = {value}: use one of {known}")
 
-    def meaning(self, value: Value) -> Value:
-        """What the equations take for a value of this port: a member of an enumeration."""
-        return next((one for one in self.choices.values() if one == value), value)
-
 
 def is_line(text: object) -> bool:
-    """Whether something is a line of text that XML can hold."""
+    """Return True for a line of text that XML can contain."""
     return isinstance(text, str) and _UNWRITABLE.search(text) is None
 
 
 def is_int32(value: float) -> bool:
-    """Whether a whole number fits into 32 bits."""
+    """Return True if a whole number fits into 32 bits."""
     return -(2**31) <= value < 2**31
 
 
@@ -162,12 +158,12 @@ def _is_bound(bound: object, fmi_type: str) -> bool:
     return is_number and -_LARGEST <= bound <= _LARGEST  # type: ignore[operator]
 
 
-#: Of the largest internal step.
+#: Name of the parameter for the largest internal step.
 H_MAX = "h_max"
 
 
 def largest_step(h_max: float) -> Port:
-    """The parameter of a component that splits its steps, with its start value [s]."""
+    """Return the parameter for the largest internal step, with its start value [s]."""
     return Port(
         H_MAX,
         "parameter",
@@ -189,5 +185,5 @@ FAULT = Port(
     "True once the component has refused an input, a parameter or a step",
 )
 
-#: The independent variable. A variable only in FMI 3.0.
+#: The independent variable, which is a variable only in FMI 3.0.
 TIME = Port("time", "independent", "continuous", "Real", "Time", "s")

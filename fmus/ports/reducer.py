@@ -1,7 +1,7 @@
-"""What an index may say: how a run is reduced to some numbers, row by row.
+"""Declarations of indices, which reduce a run to some numbers, row by row.
 
-An index looks on: it takes what components give, and gives nothing to them. It has the form of
-a component, and all of it is in the language of equations. A row of a run is an instance of its
+An index only observes: it reads signals of components, and passes nothing to them. It has the form
+of a component, and all of it is in the language of equations. A row of a run is an instance of its
 `Inputs`, whose ports have the names of signals and parameters of the run.
 """
 
@@ -21,9 +21,9 @@ from fmus.ports.fields import declared
 from fmus.ports.groups import Nothing, check_type, class_of, fields_of, form, is_record, split, word
 from fmus.ports.port import Misdeclared, Port, Value
 
-#: The functions of an index, and the arguments that each may take: `inputs` is the row that a step
-#: ends with, or that of the start; `before` the one that it begins with; `acting` the one of the
-#: two in which what acts in the step stands; `t` the time of `inputs`, `h` the length of the step,
+#: The functions of an index, and the arguments that each may take: `inputs` is the row at the end
+#: of a step, or the first row; `before` the row at its beginning; `acting` the one of the two that
+#: contains the values used in the step; `t` the time of `inputs`, `h` the length of the step,
 #: `begin` and `end` the start of the run and its planned end [s].
 HOOKS: Mapping[str, tuple[str, ...]] = {
     "start": ("inputs", "t", "begin", "end"),
@@ -37,18 +37,18 @@ ROWS = ("inputs", "before", "acting")
 
 @dataclass(frozen=True, eq=False)
 class Reducer:
-    """An index, or several that are made of the same.
+    """One or several indices with the same inputs.
 
     Attributes:
-        name: of its module.
-        hooks: by name.
+        name: name of its module.
+        hooks: functions by name.
         inputs, state, outputs: types that they take and return.
-        ports: of the inputs; their names are those of signals or parameters.
-        defaults: of those that a run may lack, by name.
-        results: of the outputs, by their fields: an index each; a value that is not a number is
-            not there.
-        meanings: what each index is, by the same names.
-        last: only the rows of so many seconds before the end of the run count [s]; None: all.
+        ports: ports of the inputs, with the names of signals or parameters.
+        defaults: values of inputs that a run may lack, by name.
+        results: ports of the outputs, by their fields: each field is an index; an index without a
+            value is not a number.
+        meanings: descriptions of the indices, by the same names.
+        last: time before the end of the run in which rows count [s]; None: all rows count.
 
     """
 
@@ -64,30 +64,30 @@ class Reducer:
     last: float | None
 
     def arguments(self, name: str) -> tuple[str, ...]:
-        """The arguments of a hook, in its own order."""
+        """Return the arguments of a hook, in its own order."""
         return tuple(signature(self.hooks[name]).parameters)
 
 
 def is_reducer(module: ModuleType) -> bool:
-    """Whether a module with hooks is an index, by what only an index says."""
+    """Return True if a module has what only an index has."""
     hooks = [one for name, one in vars(module).items() if name in HOOKS and callable(one)]
     taken = {argument for hook in hooks for argument in getattr(hook, "__annotations__", ())}
     return "LAST" in vars(module) or bool(taken & {"before", "acting", "begin", "end"})
 
 
 def read_reducer(module: ModuleType) -> Reducer:
-    """What the hooks of an index say.
+    """Read the hooks of an index.
 
     Raises:
-        Misdeclared: it is none.
+        Misdeclared: it is not an index.
 
     """
-    where, said = module.__name__, vars(module)
+    where, names = module.__name__, vars(module)
     check_spelling(module, HOOKS)
     for name in HOOKS:
-        if not isinstance(said.get(name), FunctionType):
+        if not isinstance(names.get(name), FunctionType):
             raise Misdeclared(f"{where} has no function {name}; an index has {', '.join(HOOKS)}")
-    hooks: dict[str, FunctionType] = {name: said[name] for name in HOOKS}
+    hooks: dict[str, FunctionType] = {name: names[name] for name in HOOKS}
     hints = {name: types_of_hook(f"{where}.{name}", hook) for name, hook in hooks.items()}
     types = _types(where, hints)
     inputs = declared(types["inputs"], "input")
@@ -104,17 +104,17 @@ def read_reducer(module: ModuleType) -> Reducer:
         {port.name: port.start for port in optional if port.start is not None},
         results,
         {field: _meaning(types["outputs"], field) for field in results},
-        seconds_in(said, "LAST", None),
+        seconds_in(names, "LAST", None),
     )
 
 
 def _results(outputs: Any) -> dict[str, tuple[Port, ...]]:
-    """The outputs by their fields, if indices can be such."""
+    """Return the outputs by their fields; refuse those that cannot be indices."""
     found = declared(outputs, "output")
     for field, ports in found.items():
         place = (outputs.__name__, field)
         if is_record(class_of(fields_of(outputs)[field])) or any(p.type != "Real" for p in ports):
-            why = "is no float, and no tuple or Vector of them, as every index is"
+            why = "is not a float, or a tuple or Vector of them, as every index is"
             raise Misdeclared(f"{'.'.join(place)} {why}", *place)
         for port in ports:
             if group_name(port.name) != field:
@@ -124,12 +124,12 @@ def _results(outputs: Any) -> dict[str, tuple[Port, ...]]:
 
 
 def _meaning(outputs: Any, field: str) -> str:
-    [said] = (one for one in split(fields_of(outputs)[field])[1] if isinstance(one, Variable))
-    return str(said.description)
+    [variable] = (one for one in split(fields_of(outputs)[field])[1] if isinstance(one, Variable))
+    return str(variable.description)
 
 
 def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """The types of inputs, state and outputs, if all hooks agree on them."""
+    """Return the types of inputs, state and outputs; refuse hooks that contradict each other."""
     rows = [hint for found in hints.values() for name, hint in found.items() if name in ROWS]
     states = [found["state"] for found in hints.values() if "state" in found]
     states += [hints[name]["return"] for name in ("start", "update")]
@@ -157,6 +157,6 @@ def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]
 
 
 def _usual(hints: list[Any]) -> Any:
-    """What most of some types are."""
+    """Return the most frequent type."""
     forms = [form(hint) for hint in hints]
     return max(forms, key=forms.count)

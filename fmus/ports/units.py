@@ -1,7 +1,7 @@
-"""Units of ports: a product of SI symbols, by the base units that it is made of.
+"""Units of ports: products of SI symbols, in terms of base units.
 
-A unit is written as FMI does, `kg.m2/s3`: factors with a dot between them, powers after their
-symbols, and a slash before each factor that divides, or before several in brackets.
+A unit is written as in FMI, `kg.m2/s3`: factors are separated by dots, powers follow their symbols,
+and a slash comes before each divisor, or before several divisors in brackets.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 
 class Unit(NamedTuple):
-    """What a description says of a unit: x of it are factor * x + offset of its base units.
+    """A unit: x of it are factor * x + offset in base units.
 
     Attributes:
-        type_name: of the type that variables of this unit have.
-        exponents: of the base units; None: the unit is not made of them, as far as is known.
+        type_name: name of the type of variables with this unit.
+        exponents: exponents of the base units; None for an unknown unit.
 
     """
 
@@ -28,7 +28,7 @@ class Unit(NamedTuple):
     offset: float = 0.0
 
 
-#: What types of these units are called; those of others are named after the unit.
+#: Names of types by their units; types with other units are named after the unit.
 _NAMES = {
     "1": "Dimensionless",
     "%": "Percentage",
@@ -61,7 +61,7 @@ _NAMES = {
     "s": "Time",
 }
 
-#: Base units, and what else may have a prefix, by powers of base units.
+#: Symbols that may have a prefix, as powers of base units.
 _SYMBOLS: dict[str, dict[str, int]] = {
     "m": {"m": 1},
     "s": {"s": 1},
@@ -85,7 +85,7 @@ _SYMBOLS: dict[str, dict[str, int]] = {
     "H": {"kg": 1, "m": 2, "s": -2, "A": -2},
 }
 
-#: Units that are some of others.
+#: Symbols without prefixes: factors and powers of base units.
 _OTHERS: dict[str, tuple[float, dict[str, int]]] = {
     "1": (1.0, {}),
     "%": (0.01, {}),
@@ -101,19 +101,19 @@ _OTHERS: dict[str, tuple[float, dict[str, int]]] = {
     "degC": (1.0, {"K": 1}),
 }
 
-#: The zero of units that do not begin at that of their base unit.
+#: Offsets of units whose zero differs from the zero of their base unit.
 _OFFSETS = {"degC": 273.15}
 
 _PREFIXES = {"G": 1e9, "M": 1e6, "k": 1e3, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9}
 
-#: A symbol and its power; a slash, with what it divides by, if that is in brackets.
+#: A symbol and its power; a slash with one divisor, or with several in brackets.
 _FACTOR = re.compile(r"([A-Za-z]+|[%1])\^?(-?\d+)?")
 _DIVIDED = re.compile(r"/\(([^()]*)\)|/([^./()]*)")
 
 
 @cache
 def unit_of(text: str) -> Unit:
-    """What a description says of a unit."""
+    """Read a unit."""
     name = _NAMES.get(text, f"Quantity in {text}")
     if text in _OFFSETS:
         factor, exponents = _OTHERS[text]
@@ -122,7 +122,7 @@ def unit_of(text: str) -> Unit:
     divisors = [brackets or one for brackets, one in _DIVIDED.findall(text)]
     product = _DIVIDED.sub("", text)
     if divisors and not text.startswith(f"{product}/"):
-        return Unit(name)  # a / b.c means two things
+        return Unit(name)  # a / b.c is ambiguous
     for factors, sign in ((product, 1), *((divisor, -1) for divisor in divisors)):
         for one in factors.split("."):
             found = _FACTOR.fullmatch(one)
@@ -137,7 +137,7 @@ def unit_of(text: str) -> Unit:
 
 
 def _symbol(symbol: str) -> tuple[float, dict[str, int]] | None:
-    """How many of which base units a symbol is; None: it is none."""
+    """Return the factor and the base units of a symbol; None for an unknown symbol."""
     if symbol in _OTHERS:
         return _OTHERS[symbol]
     if symbol in _SYMBOLS:

@@ -1,16 +1,16 @@
-"""The Python kind of FMU: what PythonFMU leaves to a slave, done once, and its packaging.
+"""The Python kind of FMU: the base class of slaves of PythonFMU, and the packaging.
 
 ==================== ===============================================================
-module               what it states
+module               content
 ==================== ===============================================================
-:mod:`.component`    the base of all components: what PythonFMU calls, and their runs
+:mod:`.component`    the base class of all components: callbacks of PythonFMU, and runs
 :mod:`.slave`        the slave of a component, made from its definition
-:mod:`.state`        the values of an instance, and the state of an FMU: exact and checked
-:mod:`.noise`        random numbers, of which those of a refused step are drawn again
-:mod:`.loading`      making up for what PythonFMU does to a process, and to a user's script
-:mod:`.modules`      the modules that an FMU holds, and their imports under other names
-:mod:`.packaging`    an FMU that holds Python sources and has PythonFMU run them, sealed
+:mod:`.state`        values of an instance, and the state of an FMU: exact and checked
+:mod:`.noise`        random numbers, which a refused step gives back
+:mod:`.loading`      repairs of PythonFMU's effects on a process and on user scripts
+:mod:`.modules`      the modules in an FMU, and their imports under other names
+:mod:`.packaging`    FMUs of Python sources that PythonFMU runs, with unique module names
 ==================== ===============================================================
 
-`loader` is the library that lets an FMU run where there is no Python.
+`loader` is the library that lets an FMU run in hosts that are not Python programs.
 """

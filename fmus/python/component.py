@@ -1,18 +1,18 @@
-"""The base of all components: what PythonFMU calls, and their runs.
+"""The base class of all components: the callbacks of PythonFMU, and runs.
 
-PythonFMU turns a Python class into an FMU. What it leaves to the class is done here, once:
+PythonFMU turns a Python class into an FMU. This class does what PythonFMU leaves to the slave:
 
-- Inputs, outputs and parameters reach the component as the groups that equations are written in.
-- Outputs are evaluated when they are read, until something has changed that they depend on.
-- A step is a transaction: all changes together, after everything was computed and found finite.
-- The state of the FMU is complete and exact, in memory and serialised.
+- It converts inputs, outputs and parameters to and from the groups of the equations.
+- It evaluates outputs when they are read, if something that they depend on has changed.
+- It makes each step a transaction: changes are stored together, after all results are finite.
+- It makes the state of the FMU complete and exact, in memory and serialised.
 
-No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice. Nor
-does PythonFMU learn that a call was refused; it answers fmi2OK. The native loader learns it by a
-log entry of its own category, and answers fmi2Discard or fmi2Error to that very call. Without a
-loader every step after a call that failed is discarded, until a reset or a state that is restored.
+No exception leaves a callback: PythonFMU would report fmi2Fatal and release its objects twice.
+PythonFMU also answers fmi2OK to refused calls. The native loader recognises them by a log entry of
+a special category, and answers fmi2Discard or fmi2Error to the same call. Without a loader, all
+steps after a failed call are discarded, until a reset or a restored state.
 
-Verbs are those of `fmus/native/runtime/host.h`: check, refuse, fail, log.
+The verbs check, refuse, fail and log have the same meaning as in `fmus/native/runtime/host.h`.
 """
 
 from __future__ import annotations
@@ -56,115 +56,115 @@ from fmus.python.state import (
     to_bytes,
 )
 
-#: Different messages that an instance logs: a host may step on after a refusal for ever.
+#: Limit for messages of an instance, without repeated ones: a host may continue after refusals.
 MOST_MESSAGES = 100
 
-#: Characters of a message: some hosts have a buffer of 1 or 2 kB for them.
+#: Largest length of a message: some hosts have buffers of 1 or 2 kB.
 LONGEST_MESSAGE = 500
 
-#: Longest step of a component that has no internal steps [s].
+#: Longest step of a component without internal steps [s].
 _NO_LIMIT = sys.float_info.max
 
 
 class Illegal(Refusal):
-    """A value that the standard does not let a port be set to, now or ever."""
+    """An attempt to set a port that the standard forbids to set, now or at any time."""
 
 
 class Component(Fmi2Slave):  # type: ignore[misc]
-    """Base of all components; :func:`fmus.python.slave.slave_of` makes the class of one.
+    """Base class of all components; :func:`fmus.python.slave.slave_of` makes the subclasses.
 
-    The methods that call hooks may raise: what they raise becomes a refusal.
+    Methods that call hooks may raise; the exceptions become refusals.
     """
 
     definition: ClassVar[Definition]
     #: Ports without `fault`, inputs first, then outputs, then parameters.
     ports: ClassVar[tuple[Port, ...]]
-    #: What makes groups of the values of all inputs.
+    #: Makes groups from the values of all inputs.
     unpack: Callable[[Sequence[Value]], Any]
-    #: Of which of `inputs`, `parameters`, `t` and `state` outputs are made, and what is derived.
+    #: Dependencies of outputs and of derived values: `inputs`, `parameters`, `t` or `state`.
     outputs_of: ClassVar[frozenset[str]]
     derived_of: ClassVar[frozenset[str]]
-    #: Gives the square of the norm of a state.
+    #: Returns the square of the norm of a state.
     square: Callable[[Any], float]
-    #: The parameters as they are now.
+    #: The present parameters.
     parameters: Any
 
-    # What calls the hooks
+    # Methods that call hooks
 
     def check(self, parameters: Any) -> None:
-        """Raise Refusal if parameters, each of which is good, do not fit together."""
+        """Raise Refusal if parameters that are valid one by one contradict each other."""
 
     def check_state(self, parameters: Any, state: Any) -> None:
         """Raise Refusal for a state that no run can have led to."""
 
     def seed(self, parameters: Any) -> int:
-        """The seed of the noise."""
+        """Return the seed of the noise."""
         return 0
 
     @abstractmethod
     def start(self, parameters: Any, inputs: Any, t: float) -> Any:
-        """The state at the start time."""
+        """Return the state at the start time."""
 
     @abstractmethod
     def evaluate(
         self, state: Any, derived: Any, inputs: Any, t: float, draws: Sequence[float]
     ) -> tuple[Any, list[Value]]:
-        """What is derived of a state, None if it is still to be, and the values of the outputs."""
+        """Return the derived values, or None if not needed yet, and the values of the outputs."""
 
     @abstractmethod
     def advance(
         self, state: Any, derived: Any, inputs: Any, t: float, h: float, n: int
     ) -> tuple[Any, Any]:
-        """The state after n internal steps of h seconds, of a sound size, and its derived."""
+        """Return the state after n internal steps of h seconds, and its derived values."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        said = self.definition.behaviour
+        behaviour = self.definition.behaviour
         self._store = Store(self.ports)
         self._store.groups = self.unpack(self._store.inputs)
         self._mode = INSTANTIATED
-        #: Whether a value has changed that the state at the start time depends on.
+        #: True if a value has changed that the state at the start time depends on.
         self._stale = False
         self._logged: set[str] = set()
         self._longest_step, self._latest_end = 0.0, inf
-        #: Whether inputs change the outputs, and what is derived, before the next step.
+        #: True if inputs change the outputs, or derived values, before the next step.
         self._outputs_follow = "inputs" in self.outputs_of
         self._derived_follows = "inputs" in self.derived_of
         self._is_timed = "t" in self.outputs_of | self.derived_of
-        self._is_sampled = said.is_sampled
-        #: Whether a step evaluates the outputs at its end: no input changes them.
-        self._is_prompt = not (said.is_sampled or self._outputs_follow)
+        self._is_sampled = behaviour.is_sampled
+        #: True if a step evaluates the outputs at its end, since no input changes them.
+        self._is_prompt = not (behaviour.is_sampled or self._outputs_follow)
         self._has_loader = has_loader(self.resources)
-        #: Why a call failed, which PythonFMU has answered with fmi2OK; without a loader only.
+        #: Reason of a failed call that PythonFMU answered with fmi2OK; without a loader only.
         self._failure = ""
 
     # Refusals and messages
 
     def _refuse(self, status: Fmi2Status, why: str, key: str | None = None) -> None:
-        """Answer the call with a status, and log why."""
+        """Answer the call with a status, and log the reason."""
         self.log_once(why, status, key)
         if self._has_loader:
             self.log("", status, ANSWER)
 
     def _fail(self, why: str, status: Fmi2Status = Fmi2Status.error) -> None:
-        """Refuse a call that changes the run: without a loader, all steps from now on."""
+        """Refuse a call that changes the run; without a loader, also all later steps."""
         self._refuse(status, why)
         if not self._has_loader:
             self._failure = self._failure or why
 
     def _pass_time(self, time: float) -> None:
-        """Let the native loader know a time that the arguments of the call do not lead to."""
+        """Tell the native loader a time that it cannot compute from the arguments of the call."""
         if self._has_loader:
             self.log(pack(">d", time).hex(), Fmi2Status.ok, ANSWER)
 
     def describe(self, error: BaseException) -> str:
-        """Give the reason in an exception; one that is not a Refusal is named by its type."""
+        """Return the message of an exception, with the type unless it is a Refusal."""
         if isinstance(error, Refusal):
             return str(error)
         return f"{place(error)}{type(error).__name__}: {error}"
 
     def log_once(self, message: str, status: Fmi2Status, key: str | None = None) -> None:
-        """Log a message only the first time that its key, or else its text, occurs.
+        """Log a message, only the first time that its key, or else its text, occurs.
 
         The host adds the name of the instance.
         """
@@ -174,11 +174,11 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         self._logged.add(key)
         if len(self._logged) == MOST_MESSAGES:
             message += "; further messages are not logged"
-        # FMI defines a log message as a format: a host would take a % for a directive.
+        # In FMI a log message is a format string, so each % is doubled.
         self.log(message[:LONGEST_MESSAGE].replace("%", "%%"), status)
 
     def _check_mode(self, call: str, mode: str) -> bool:
-        """Whether a call comes in the one mode that it is allowed in; else it fails."""
+        """Return True if a call is allowed in the present mode; otherwise let it fail."""
         if self._mode != mode:
             self._fail(f"{call} is not allowed when {self._mode}")
         return self._mode == mode
@@ -191,7 +191,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             return self._get(vrs, "Real")
         if not store.fresh:
             self._refuse_outdated()
-        # PythonFMU reads the list and lets go of it, so it need not be a copy.
+        # PythonFMU only reads the list, so it need not be a copy.
         return store.outputs if store.only_outputs else store.outputs[: len(vrs)]
 
     def get_integer(self, vrs: list[int]) -> list[int]:
@@ -206,7 +206,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
 
     def set_real(self, vrs: list[int], values: list[Any]) -> None:
         store = self._store
-        # A sum is finite only if every value is; _set finds out which one was not.
+        # A sum is finite only if every value is; _set finds the value that is not.
         if vrs == store.free_inputs and self._mode == STEPPING and isfinite(sum(values)):
             if not store.has_only_reals:
                 values = [*values, *store.inputs[len(values) :]]
@@ -228,7 +228,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         self._set(vrs, values, "String")
 
     def _refuse_outdated(self) -> None:
-        """Refuse to give outputs that cannot be brought up to date."""
+        """Refuse a call for outputs that cannot be evaluated."""
         if why := self._refresh():
             self._refuse(Fmi2Status.error, why)
 
@@ -245,7 +245,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         return values
 
     def _set(self, vrs: list[int], values: Sequence[Any], fmi_type: str) -> None:
-        """Take all values of a call, or none."""
+        """Accept all values of a call, or none."""
         if self._mode == TERMINATED:
             self._check_mode(f"fmi2Set{fmi_type}", STEPPING)
             return
@@ -259,7 +259,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         except Illegal as refusal:
             self._fail(str(refusal))
         except BaseException as error:
-            # A run with another parameter than the host asked for must not begin.
+            # A run must not begin with another parameter than the host wanted.
             begins = self._mode != STEPPING and any(p.causality == "parameter" for p in ports)
             self._store.fault = True
             self._fail(self.describe(error), Fmi2Status.error if begins else Fmi2Status.discard)
@@ -285,11 +285,8 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             store.parameters = parameters
             self._forget("parameters")
         if any(port.causality == "input" for port in ports):
-            self._take_inputs(inputs)
-
-    def _take_inputs(self, values: list[Value]) -> None:
-        self._store.inputs, self._store.groups = values, self.unpack(values)
-        self._forget("inputs")
+            store.inputs, store.groups = inputs, self.unpack(inputs)
+            self._forget("inputs")
 
     # Experiment
 
@@ -326,11 +323,11 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         self._mode = TERMINATED
 
     def _begin(self) -> None:
-        """Compute state and outputs at the start time."""
+        """Compute the state and the outputs at the start time."""
         store = self._store
         self._adopt(store.parameters, self._meaning(store.parameters))
         count = self.definition.behaviour.draws
-        # Random takes the magnitude of its seed: a negative one is the number 2^32 above it.
+        # Random uses the magnitude of its seed, so a negative seed is made positive modulo 2^32.
         noise = Noise(Random(self.seed(self.parameters) % 2**32), count) if count else None
         draws = noise.draw() if noise else ()
         inputs, t = store.groups, store.start_time
@@ -345,7 +342,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             raise Refusal(f"the state is not finite, or exceeds {LARGEST_STATE:g}")
 
     def _meaning(self, values: dict[str, Value]) -> tuple[Any, float]:
-        """What the values of all parameters come to, and the longest step with them [s]."""
+        """Return the parameter set of the equations, and the longest internal step [s]."""
         parameters = self.definition.parameters.of(values)
         self.check(parameters)
         h_max = float(values.get(H_MAX, _NO_LIMIT))
@@ -358,10 +355,10 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     # Outputs
 
     def _refresh(self) -> str:
-        """Bring the outputs up to date, and before a run the state at the start time, too.
+        """Bring the outputs up to date, and before a run also the state at the start time.
 
         Returns:
-            Why that cannot be; empty: they are.
+            The reason of a failure; empty if there is none.
 
         """
         store = self._store
@@ -385,7 +382,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         return ""
 
     def _forget(self, what: str) -> None:
-        """Discard what has been computed of `inputs` or `parameters`, which have changed."""
+        """Discard results that depend on `inputs` or `parameters`, which have changed."""
         if self._mode == STEPPING:
             if what in self.outputs_of:
                 self._store.fresh = False
@@ -399,8 +396,8 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Advance by one communication step.
 
-        A step longer than `h_max` is split evenly, a zero step changes nothing, a negative one
-        is refused. After a refusal everything is as it was before the step.
+        A step longer than `h_max` is split evenly, a zero step changes nothing, a negative one is
+        refused. A refused step changes nothing.
         """
         t, h, end = current_time, step_size, current_time + step_size
         if self._mode != STEPPING or end > self._latest_end:
@@ -446,7 +443,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         return True
 
     def _fail_step(self, t: float, end: float) -> bool:
-        """Fail a step in another mode, or beyond the stop time."""
+        """Refuse a step in another mode, or beyond the stop time."""
         if self._check_mode("fmi2DoStep", STEPPING):
             stop = self._store.stop_time
             self._fail(f"step from {t:g} s to {end:g} s: the stop time is {stop:g} s")
@@ -469,7 +466,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
     # State
 
     def _identity(self) -> str:
-        """Names class and version: the modules of a built FMU carry a hash of their contents."""
+        """Return class and version: names of modules in an FMU contain a hash of its contents."""
         return f"{type(self).__module__}.{type(self).__qualname__}"
 
     def _get_fmu_state(self) -> Mapping[str, Any]:
@@ -502,8 +499,8 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             self._fail(f"state refused: {self.describe(error)}")
 
     def _restore(self, saved: Mapping[str, Any]) -> None:
-        store, said = self._store, self.definition.behaviour
-        wanted = checked(saved, self._identity(), store, said)
+        store, behaviour = self._store, self.definition.behaviour
+        wanted = checked(saved, self._identity(), store, behaviour)
         state, noise = wanted["state"], None
         if state is None:
             store.parameters = wanted["parameters"]
@@ -512,9 +509,9 @@ class Component(Fmi2Slave):  # type: ignore[misc]
             if not self.square(state) <= LARGEST_STATE * LARGEST_STATE:
                 raise Refusal(f"it exceeds {LARGEST_STATE:g}")
             self.check_state(meaning[0], state)
-            if said.draws:
-                noise = Noise.restored(wanted["generator"], said.draws)
-            # Nothing of this instance has changed so far, and nothing can fail after this.
+            if behaviour.draws:
+                noise = Noise.restored(wanted["generator"], behaviour.draws)
+            # The instance is unchanged up to here, and nothing after this can fail.
             self._adopt(wanted["parameters"], meaning)
         store.inputs, store.groups = wanted["inputs"], self.unpack(wanted["inputs"])
         store.outputs = wanted["outputs"] or store.no_outputs()
@@ -523,7 +520,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
         store.time = wanted["time"]
         store.noise, store.draws, store.fault = noise, wanted["draws"], wanted["fault"]
         self._mode, self._failure = wanted["mode"], ""
-        # Before the first step all follows from parameters and inputs, and is computed once more.
+        # Before the first step, the state follows from parameters and inputs, and is recomputed.
         self._stale = self._mode == INITIALISING
         store.fresh = not self._stale and (state is None or wanted["fresh"])
         store.held = wanted["held"]
@@ -536,8 +533,7 @@ class Component(Fmi2Slave):  # type: ignore[misc]
 
     def to_xml(self, model_options: dict[str, str] | None = None) -> Element:
         root: Element = super().to_xml()
-        # Two builds of the same sources must be the same bytes; the time of the build is not in
-        # them.
+        # Builds of the same sources must be equal, so the time of the build is removed.
         del root.attrib["generationDateAndTime"]
         root.set("generationTool", f"auv-fmu {__version__} with {root.get('generationTool')}")
         return complete(root, self._store.ports)

@@ -1,20 +1,21 @@
-"""Make up for what PythonFMU 0.7 does to a process, and keep from it what a user's script raises.
+"""Repair the effects of PythonFMU 0.7 on a process, and catch exceptions of users' scripts.
 
-Each time it creates an instance, it imports the slave's script, then runs its source once more,
-with the module's namespace as the globals and a new one as the locals, and searches the locals for
-the class.
+For each instance, PythonFMU imports the slave's script, then runs its source again, with the
+module's namespace as the globals and a new one as the locals, and searches the locals for the
+class.
 
-- It lets go of a reference to the module's namespace that it does not own. After some dozens of
-  instances the namespace would be freed under the running process.
-- The search never frees what it makes of each base of each class it meets: more than a kilobyte
-  an instance.
-- It puts the resources folder on sys.path and never takes it off; it never frees the path either.
-- It takes it for granted that messages and strings can be encoded, and otherwise ends the process.
-- Its library frees the object that watches over the interpreter twice when the process ends,
-  which now and then ends in "corrupted double-linked list" and an exit status of 134.
+- It releases a reference to the module's namespace that it does not own. After some dozens of
+  instances the namespace would be freed in the running process.
+- The search leaks an object for each base of each class in the locals: more than a kilobyte for
+  each instance.
+- It puts the resources folder on sys.path and never removes it, and leaks the path.
+- It ends the process if a message or string cannot be encoded.
+- Its library frees the guard of the interpreter twice when the process ends, which sometimes gives
+  "corrupted double-linked list" and an exit status of 134.
 
-It answers an exception with fmi2Fatal, and its message has no line. A slave on the base of this
-package raises none; what a plain one raises is caught here and reported with file and line.
+It answers an exception with fmi2Fatal, and its message has no line. Slaves derived from the base
+class of this package raise no exceptions; exceptions of other slaves are caught here, and reported
+with file and line.
 """
 
 from __future__ import annotations
@@ -30,16 +31,16 @@ from typing import Any, Callable, TypeVar
 
 from pythonfmu.enums import Fmi2Status
 
-#: Category of a log entry by which the native loader learns the status of the call.
+#: Category of log entries that pass the status of a call to the native loader.
 ANSWER = "answer"
 
-#: The answer instead of values that could not be read.
+#: Results in place of values that could not be read.
 MISSING: dict[str, Any] = {"Real": 0.0, "Integer": 0, "Boolean": False, "String": ""}
 
-#: The same, by the callback that is asked for them.
+#: The same, by callback.
 _INSTEAD = {f"get_{kind.lower()}": value for kind, value in MISSING.items()}
 
-#: Callbacks that are kept from raising; a step answers for itself.
+#: Callbacks whose exceptions are caught; a step has a wrapper of its own.
 _CALLS = (
     "setup_experiment",
     "enter_initialization_mode",
@@ -49,45 +50,45 @@ _CALLS = (
     *_INSTEAD,
 )
 
-#: What sealing has put after the name of every module in the FMU; empty: this is not in one.
+#: Suffix that sealing added to the names of all modules in the FMU; empty outside of FMUs.
 _SEAL = "".join(re.findall(r"_[0-9a-f]{12}$", __name__.partition(".")[0]))
 
-#: Packages that are in an FMU beside the user's script.
+#: Packages in an FMU that are not the user's.
 _OURS = tuple(f"{package}{_SEAL}" for package in ("fmus", "auv_fmu", "pythonfmu"))
 
 Slave = TypeVar("Slave", bound=type)
 
 
 def settle(slave: type, module: dict[str, Any], found: dict[str, Any]) -> None:
-    """To be called by the script of a slave, as its last statement, when all is imported.
+    """Prepare the search for the slave: the last statement of its script.
 
     Args:
-        slave: the class that PythonFMU shall find.
+        slave: the class that PythonFMU is to find.
         module: `globals()` of the script.
-        found: its `locals()`.
+        found: `locals()` of the script.
 
     """
-    # A search that finds no class ends in the module's attribute with the empty name.
+    # If the search finds no class, PythonFMU takes the module's attribute with the empty name.
     module[""] = slave
     if found is module:
         _make_encodable(slave)
         return
     found.clear()
-    # What is one reference short is given back, what has one too many is relieved of it.
+    # Restore the reference that PythonFMU releases, and below drop the one that it leaks.
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(module))
-    # Other threads put other folders before it, and take them away.
+    # Other threads may insert and remove other folders.
     script = module["__name__"]
     path = next((folder for folder in [*sys.path] if _resources_of(folder, script)), None)
     if path is not None:
         sys.path.remove(path)
         _release_interpreter(Path(path))
-        same_but_ours = f"{path}/"
-        if sys.getrefcount(path) == sys.getrefcount(same_but_ours) + 1:
+        fresh = f"{path}/"
+        if sys.getrefcount(path) == sys.getrefcount(fresh) + 1:
             ctypes.pythonapi.Py_DecRef(ctypes.py_object(path))
 
 
 def _make_encodable(slave: Any) -> None:
-    """Make a class of slaves log and return only text that can be encoded."""
+    """Make a slave's class log and return only text that can be encoded."""
     log, get_string = slave.log, slave.get_string
 
     def clear_log(self: Any, msg: object, *args: Any, **kwargs: Any) -> None:
@@ -104,7 +105,7 @@ def _encodable(text: object) -> str:
 
 
 def has_loader(resources: str | None) -> bool:
-    """Whether the native loader is between the host and the slave of a folder of resources."""
+    """Return True if the FMU with a folder of resources has the native loader."""
     return (
         resources is not None
         and sys.platform.startswith("linux")
@@ -120,25 +121,25 @@ def _resources_of(folder: str, script: str) -> bool:
 
 
 def _release_interpreter(resources: Path) -> None:
-    """Free the library's watch over the interpreter now, so that the end of the process cannot.
+    """Free the library's guard of the interpreter now, so that it is not freed twice at the end.
 
-    Only where the process is Python's own. Otherwise the library has started the interpreter
-    itself, and freeing its watch would end it.
+    This is only for Python processes. In other processes the library has started the interpreter,
+    and freeing the guard would end it.
     """
     if not any(getattr(sys, "orig_argv", sys.argv)):
         return
     for library in resources.parent.glob("binaries/linux64/*.so"):
         try:
-            # Under the interpreter lock: a thread may be making another instance.
+            # PyDLL keeps the interpreter lock: another thread may be making an instance.
             loaded = ctypes.PyDLL(str(library), mode=os.RTLD_LAZY | os.RTLD_NOLOAD)
             loaded.finalizePythonInterpreter()
         except (OSError, AttributeError):
-            # Not the library that runs this instance, or one that has no such function.
+            # Another library than the one that runs this instance, or one without the function.
             continue
 
 
 def place(error: BaseException) -> str:
-    """Where in a user's script an error was raised, as `script.py:12: `; empty: in none."""
+    """Return the place of an error in a user's script, as `script.py:12: `, or an empty text."""
     if not _SEAL:
         return ""
     places = [
@@ -151,7 +152,7 @@ def place(error: BaseException) -> str:
 
 
 def caught(slave: Slave) -> Slave:
-    """A class of slaves that raise nothing: no step is taken after what they have raised."""
+    """Make a slave's class catch its exceptions; after one, all steps are discarded."""
     if any(base.__module__.partition(".")[0] == _OURS[0] for base in slave.__mro__):
         return slave
     for name in _CALLS:
@@ -190,5 +191,5 @@ def _catching(method: Callable[..., Any], name: str) -> Callable[..., Any]:
 
 def _log_error(slave: Any, error: BaseException, what: str = "") -> None:
     text = f"{what}{place(error)}{type(error).__name__}: {error}"
-    # FMI defines a log message as a format: a host would take a % for a directive.
+    # In FMI a log message is a format string, so each % is doubled.
     slave.log(text.replace("%", "%%"), Fmi2Status.error)

@@ -1,4 +1,4 @@
-"""The modules that an FMU holds: where they are, and their imports under other names."""
+"""The modules in an FMU: finding them, and importing them under other names."""
 
 from __future__ import annotations
 
@@ -16,34 +16,34 @@ from typing import NamedTuple
 
 
 def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dict[str, Path]:
-    """Find the modules that a script needs: those it imports, those that these import and so on.
+    """Find the modules that a script imports, directly or through others.
 
-    Modules in other places, such as installed packages, are left out: the host has them.
+    Modules in other places, such as installed packages, are left out: the host must have them.
 
     Args:
-        text: of the script.
-        packages: that may be among them, and the folders that they are in.
-        own: folder that its other modules are in; None: there are none.
+        text: text of the script.
+        packages: packages that are included, and their folders.
+        own: folder of the script's other modules, if any.
 
     Returns:
-        The files, by their places below the folder that the script is in.
+        The files, by their paths relative to the script's folder.
 
     Raises:
-        SyntaxError: one of them is no Python.
+        SyntaxError: a module is not valid Python.
 
     """
     files: dict[str, Path] = {}
-    #: The folders that the modules in each are found in; none, if it is no package.
+    #: Folders of the modules in each package; empty for a module.
     places: dict[str, Sequence[str]] = {}
 
     def imported_by(name: str) -> Iterator[str]:
-        """The names that a module imports; it and the packages that it is in are needed."""
+        """Add a module and its parent packages to the files, and yield the names they import."""
         parent, _, last = name.rpartition(".")
         if parent and parent not in places:
             yield from imported_by(parent)
         root = _root(name.partition(".")[0], packages, own)
         within = places.get(parent, () if parent or root is None else [str(root)])
-        # By the last part: Python would look up the packages before it, which are not imported.
+        # Search for the last part only: Python would import the packages before it.
         found = PathFinder.find_spec(last, [*within])
         places[name] = [*((found and found.submodule_search_locations) or ())]
         file = Path(found.origin) if found and found.origin else None
@@ -58,7 +58,7 @@ def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dic
     while wanted:
         name = wanted.pop()
         if name.endswith(".*"):
-            # Any module of the package may be meant.
+            # A star may stand for any module of the package.
             package = name[:-2]
             for place in places.get(package, ()):
                 wanted += (f"{package}.{it.stem}" for it in sorted(Path(place).glob("*.py")))
@@ -68,19 +68,19 @@ def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dic
 
 
 def _root(top: str, packages: Mapping[str, Path], own: Path | None) -> Path | None:
-    """The folder that a top-level module lies in; None: it is not to be followed."""
+    """Return the folder of a top-level module; None if the module is not included."""
     if top in packages:
         return packages[top].parent
     if own is None or top in sys.builtin_module_names:
         return None
-    # A folder that is no package gives way to a package elsewhere.
+    # A package elsewhere comes before a folder without __init__.py.
     found = PathFinder.find_spec(top, [str(own), *sys.path])
     places = [*(found.submodule_search_locations or (found.origin,))] if found else []
     return own if any(place and Path(place).parent == own for place in places) else None
 
 
 def _imported(tree: ast.AST, package: str) -> Iterator[str]:
-    """The names that may be of modules in the imports of a module; a star is one of them."""
+    """Yield the names in the imports of a module that may be modules, including stars."""
     for node in _executed(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
@@ -89,13 +89,13 @@ def _imported(tree: ast.AST, package: str) -> Iterator[str]:
             base = ".".join(
                 [*(parts if node.level else ()), *([node.module] if node.module else [])]
             )
-            # Last in, first out: the package before what is in it.
+            # The last name is processed first: the package before its members.
             yield from (f"{base}.{alias.name}" for alias in node.names)
             yield base
 
 
 def _executed(tree: ast.AST) -> Iterator[ast.AST]:
-    """The nodes of a module, without those that only a type checker reads."""
+    """Yield the nodes of a module, except those for type checkers only."""
     nodes = [tree]
     for node in nodes:
         if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING"):
@@ -109,25 +109,25 @@ def _executed(tree: ast.AST) -> Iterator[ast.AST]:
 
 
 class _Import(NamedTuple):
-    """Where a module is imported, in bytes of UTF-8."""
+    """An import of a module; positions are in bytes of UTF-8."""
 
-    top: str  #: the first part of its name
-    end: int  #: of the first part
-    bound: bytes = b""  #: the name that it has from then on, if that is the first part
-    is_within: bool = False  #: whether there are more parts
-    whole_end: int = 0  #: of all parts
+    top: str  #: first part of the module's name
+    end: int  #: end of the first part
+    bound: bytes = b""  #: name that the import binds, if that is the first part
+    is_within: bool = False  #: true if there are more parts
+    whole_end: int = 0  #: end of all parts
 
 
 def with_other_imports(content: bytes, names: Collection[str], suffix: str) -> bytes:
-    """The text of a module that imports others under longer names, and has them under their own.
+    """Change the imports of a module to longer names, which are bound to the original ones.
 
     Args:
-        content: as it is in the file.
-        names: of top-level modules that have other names.
-        suffix: what is added to their names.
+        content: bytes of the module.
+        names: top-level modules with longer names.
+        suffix: suffix of the longer names.
 
     Raises:
-        SyntaxError: it is no Python.
+        SyntaxError: the module is not valid Python.
 
     """
     text, added = decode_source(content).encode(), suffix.encode()
@@ -151,7 +151,7 @@ _FROM, _NAME = re.compile(rb"from[\s\\]+"), re.compile(rb"[\w\x80-\xff]+")
 
 @lru_cache(maxsize=512)
 def _imports(text: bytes) -> list[_Import]:
-    """The imports of modules by absolute names, in their order."""
+    """Return the imports of modules by absolute names, in order."""
     begins = [0]
     for line in text.split(b"\n"):
         begins.append(begins[-1] + len(line) + 1)

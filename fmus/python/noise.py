@@ -1,4 +1,4 @@
-"""Python's random numbers, of which those of a refused step are drawn again."""
+"""Random numbers of Python's generator, which a refused step gives back."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from typing import Any
 
 from auv_fmu.language.variable import Refusal
 
-#: No normal number that is drawn is larger: it is made of 53 bits.
+#: Bound of normal random numbers: Python makes them from 53 bits.
 LARGEST_DRAW = 9.0
 
-#: Numbers that are drawn between two notes of a generator's state.
+#: Number of draws after which the generator's state is saved again.
 _MOST_DRAWN = 1_000
 
 
 def check_draws(*numbers: float) -> None:
-    """Refuse numbers that are not drawn."""
+    """Refuse numbers that cannot have been drawn."""
     if not all(abs(number) <= LARGEST_DRAW for number in numbers):
         raise Refusal("its noise is none that can be drawn")
 
@@ -23,33 +23,27 @@ def check_draws(*numbers: float) -> None:
 class Noise:
     """A generator of independent standard normal numbers.
 
-    To note its state takes as long as a step. So it is noted once in many steps, and what was drawn
-    since then is counted, to be drawn again where a step is refused.
+    Saving its state takes as long as a step. So the state is saved once in many steps, and draws
+    are counted, so that they can be repeated after a refused step.
     """
 
     def __init__(self, generator: Random, count: int) -> None:
-        """Begin where a generator is.
-
-        Args:
-            generator: of Python.
-            count: of the numbers that are drawn together.
-
-        """
+        """Continue one of Python's generators, with draws of `count` numbers."""
         self._generator, self._count = generator, count
         self._means, self._deviations = (0.0,) * count, (1.0,) * count
         self._note()
 
     @classmethod
     def restored(cls, state: Any, count: int) -> Noise:
-        """The generator that has a state.
+        """Make a generator from its state.
 
         Raises:
-            Exception: none has.
+            Exception: the state is invalid.
 
         """
         generator = Random()
         generator.setstate(state)
-        # Some of what setstate takes it changes in silence, or only gauss finds out about.
+        # setstate changes some invalid states silently, and accepts others that gauss cannot use.
         *_, following = state
         if generator.getstate() != state or type(following) not in (float, type(None)):
             raise Refusal("its noise generator has an invalid state")
@@ -58,14 +52,14 @@ class Noise:
 
     @property
     def state(self) -> tuple[Any, ...]:
-        """What it is restored from: immutable, fit for JSON."""
+        """State of the generator: immutable, and suitable for JSON."""
         return self._generator.getstate()
 
     def _note(self) -> None:
         self._noted, self._drawn = self._generator.getstate(), 0
 
     def draw(self) -> tuple[float, ...]:
-        """The next numbers."""
+        """Draw the next numbers."""
         if self._drawn >= _MOST_DRAWN:
             self._note()
         self._drawn += self._count
@@ -73,7 +67,7 @@ class Noise:
         return tuple(map(gauss, self._means, self._deviations))
 
     def take_back(self) -> None:
-        """Let the numbers that were drawn last be the next ones."""
+        """Undo the last draw, so that the next one returns the same numbers."""
         self._drawn -= self._count
         self._generator.setstate(self._noted)
         for _ in range(self._drawn):

@@ -1,4 +1,4 @@
-"""The Python kind: an FMU that holds Python sources, PythonFMU to run them, and our loader."""
+"""The Python kind: FMUs of Python sources, PythonFMU and our loader."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from fmus.discovery import (
     digest_of,
     guid_of,
     licences,
-    package_folder,
     write_archive,
 )
 from fmus.kinds import PYTHON
 from fmus.python.modules import modules_of, with_other_imports
 from fmus.script import data_files, import_from, no_component
 from orchestrator.machine.compilers import Compiler, compile_library, own_compiler
+from orchestrator.machine.identity import package_folder
 
 _FOLDERS = {package: package_folder(package) for package in ("auv_fmu", "fmus")}
 
@@ -40,7 +40,7 @@ from fmus.python.slave import slave_of
 settle({component}, globals(), locals())
 """
 
-#: That of a slave of the user's own, which may raise.
+#: The script of a user's slave, which may raise exceptions.
 _OWN_SCRIPT = """\
 from fmus.python.loading import caught, settle
 from {module} import {component}
@@ -48,45 +48,45 @@ from {module} import {component}
 settle(caught({component}), globals(), locals())
 """
 
-#: How FMUs are loaded: by a library of our own, or by PythonFMU's.
+#: Libraries that load FMUs: the native loader, or plain PythonFMU.
 LOADERS = ("native", "plain")
 
 #: Sources of the native loader, which lets an FMU run in a host that is not a Python program;
-#: loader.h says what each is for, and fmi2.c includes all others.
+#: loader.h describes each file, and fmi2.c includes all others.
 LOADER = Path(__file__).parent / "loader"
 
-#: How they are compiled, in their folder, into a library.
+#: Options of the compiler, which runs in their folder.
 LOADER_FLAGS = (
     "-std=gnu11", "-shared", "-fPIC", "-fvisibility=hidden", "-pthread",
-    # Python holds on to it, so it must stay until the process ends.
+    # Python keeps pointers into the library, so it must never be unloaded.
     "-Wl,-z,nodelete",
     "fmi2.c", "-ldl",
 )  # fmt: skip
 
-#: Where PythonFMU's own library goes when the loader takes its name.
+#: Folder of the library; PythonFMU's is renamed when the loader takes its name.
 _LINUX = "binaries/linux64/"
 
 _RESOURCES = "resources/"
 _SLAVE_MODULE = "resources/slavemodule.txt"
 _DESCRIPTION = "modelDescription.xml"
 
-#: Where the loader finds the GUID: a library knows only the folder of resources.
+#: File with the GUID for the loader, to which only the folder of resources is passed.
 _GUID_FILE = "resources/guid.txt"
 _GUID = re.compile(rb'guid="[^"]*"')
 
-#: What PythonFMU writes besides: the time of the build.
+#: The time of the build, which PythonFMU writes.
 _TIME = re.compile(rb' generationDateAndTime="[^"]*"')
 
 
 def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> dict[str, bytes]:
-    """The contents of an FMU, before it is sealed.
+    """Return the contents of an FMU, before it is sealed.
 
     Args:
-        name: of the FMU.
-        text: of the script, which settles a slave (:mod:`fmus.python.loading`).
+        name: name of the FMU.
+        text: text of its script, which calls `settle` (:mod:`fmus.python.loading`).
         loader: `native` or `plain`.
-        own: folder of modules that go into the FMU beside this package's, with the data files that
-            they have read; None: none.
+        own: folder of the user's modules, which are included with the data files that they have
+            read; None for a bundled component.
 
     Raises:
         OSError: the loader cannot be compiled.
@@ -95,7 +95,7 @@ def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> d
     with TemporaryDirectory(prefix="auv_fmu_build_") as temporary:
         stage, built = Path(temporary, "stage"), Path(temporary, "built")
         stage.mkdir()
-        # Not the name itself: some file systems would take lag.py, beside it, for Lag.py.
+        # Not {name}.py: some file systems do not distinguish Lag.py from a module lag.py.
         path = stage / f"{name}_fmu.py"
         path.write_text(text, encoding="utf-8")
         for place, source in modules_of(text, _FOLDERS, own).items():
@@ -119,13 +119,13 @@ def fmu_entries(name: str, text: str, loader: str, own: Path | None = None) -> d
 
 
 def loader_compiler() -> Compiler | None:
-    """The C compiler, if this is a platform that the loader is for and there is one."""
+    """Return the C compiler for the loader; None if there is none, or this is not Linux."""
     return own_compiler() if sys.platform.startswith("linux") else None
 
 
 @cache
 def compiled_loader() -> bytes:
-    """The loader as a shared library.
+    """Compile the loader.
 
     Raises:
         OSError: there is no compiler, or it fails.
@@ -142,7 +142,7 @@ def compiled_loader() -> bytes:
 
 
 def _with_loader(entries: dict[str, bytes]) -> dict[str, bytes]:
-    """The entries of an FMU with the loader instead of PythonFMU's library."""
+    """Put the loader in the place of PythonFMU's library, which is renamed."""
     changed = dict(entries)
     for name, content in entries.items():
         if name.startswith(_LINUX) and name.endswith(".so"):
@@ -152,7 +152,7 @@ def _with_loader(entries: dict[str, bytes]) -> dict[str, bytes]:
 
 
 def best_loader() -> str:
-    """The loader for new files: native where it can be compiled."""
+    """Return the default loader: native if it can be compiled."""
     return "plain" if loader_compiler() is None else "native"
 
 
@@ -160,17 +160,12 @@ def best_loader() -> str:
 
 
 def seal(entries: dict[str, bytes], destination: Path) -> None:
-    """Write an FMU sealed: reproducible, and isolated from others in its process.
+    """Write a sealed FMU: reproducible, and isolated from others in its process.
 
-    All PythonFMU FMUs of a process share one interpreter and import their modules by bare name:
-    of two FMUs that bundle a module of the same name, the second silently runs the first one's
-    code. Sealing gives every top-level module in `resources` a name that carries a hash of the
-    FMU's contents, and the FMU a GUID made from the same hash.
-
-    Args:
-        entries: of the FMU, by their names.
-        destination: file to write.
-
+    All PythonFMU FMUs of a process share one interpreter and import their modules by plain names:
+    of two FMUs with a module of the same name, the second silently runs the first one's code.
+    Sealing adds a hash of the FMU's contents to the name of every top-level module in `resources`,
+    and gives the FMU a GUID made from the same hash.
     """
     entries = dict(entries)
     description = _TIME.sub(b"", entries[_DESCRIPTION], count=1)
@@ -207,12 +202,12 @@ class PythonKind:
 
     loader: str
     name = PYTHON
-    #: How many are written at the same time: PythonFMU imports what it builds.
+    #: Number of FMUs that are written in parallel: PythonFMU imports the modules that it builds.
     side_by_side = 1
 
     @property
     def settings(self) -> dict[str, str]:
-        """What the FMUs depend on besides their sources."""
+        """Settings that the FMUs depend on in addition to their sources."""
         return {"kind": PYTHON, "loader": self.loader}
 
     def write(self, source: Source, path: Path) -> None:
@@ -231,18 +226,18 @@ class PythonKind:
 
 
 def build_script(script: Path, destination: Path, loader: str | None = None) -> Path:
-    """Build the FMU of a user's own script, whose class of PythonFMU is plain or on our base.
+    """Build the FMU of a user's script with a class of PythonFMU.
 
-    Modules that lie beside the script are in it, and data files that were read while the script was
-    imported and its slave was made.
+    It contains the modules in the script's folder that are imported, and the data files that were
+    read while the script was imported and its slave was made.
 
     Args:
         script: a Python file with one slave.
-        destination: folder of the FMU, which gets the name of the slave's class.
-        loader: `native` or `plain`; None: native where it can be compiled.
+        destination: folder of the FMU, which is named after the slave's class.
+        loader: `native` or `plain`; None: native if it can be compiled.
 
     Raises:
-        Exception: whatever the script raises when it is imported or its slave is made.
+        Exception: raised by the script when it is imported or its slave is made.
 
     """
     own = script.resolve().parent

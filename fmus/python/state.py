@@ -1,4 +1,4 @@
-"""The values of an instance, and the state of its FMU: complete, exact, and checked when taken.
+"""Values of an instance, and the state of its FMU: complete, exact, and checked on restoring.
 
 The state of a component is a NamedTuple of numbers, truth values, members of enumerations, and of
 tuples, vectors, matrices and NamedTuples of them.
@@ -23,7 +23,7 @@ from fmus.ports.port import FAULT, Port, Value, is_int32
 from fmus.python.loading import MISSING
 from fmus.python.noise import Noise, check_draws
 
-#: Types of ports, by those of the calls that pass their values; no port is a text.
+#: Types of ports by the type in the name of FMI's functions; no port is a String.
 _PASSED = {
     "Real": ("Real",),
     "Integer": ("Integer", "Enumeration"),
@@ -31,7 +31,7 @@ _PASSED = {
     "String": (),
 }
 
-#: Values of ports that have none.
+#: Values of ports without a start value.
 _NOTHING = {**MISSING, "Enumeration": 0}
 
 #: Modes of an instance.
@@ -42,8 +42,8 @@ INSTANTIATED, INITIALISING, STEPPING, TERMINATED = MODES = (
     "terminated",
 )
 
-#: Key of what speaks against bytes or a snapshot: PythonFMU asks for them where nothing can be
-#: reported, so they are refused when they are set.
+#: Key of the reason why a state is invalid. PythonFMU reads states in calls that cannot report
+#: errors, so an invalid state is refused when it is set.
 _UNUSABLE = "unusable"
 
 #: Key of the checksum in the bytes of a state.
@@ -51,31 +51,32 @@ _CHECKSUM = "checksum"
 
 
 class Store:
-    """Values of all ports, and what else a run is made of.
+    """Values of all ports, and the rest of the state of a run.
 
-    A port's value reference is its place among the ports. All inputs and all outputs lie in lists
-    of their own, Reals first and in their order, so that a host that passes these all in one call
-    costs one comparison instead of one look-up a value.
+    A port's value reference is its index among the ports. Inputs and outputs are kept in separate
+    lists, Reals first and in order of reference, so that a call that passes all of them takes one
+    comparison instead of a look-up for each value.
 
     Attributes:
-        ports: of the component, `fault` last.
-        inputs, outputs: values of all but `fault`.
-        input_references, output_references: of them, in the order of their values.
-        places: where the values lie, by their references.
-        all_outputs: the references of all outputs but `fault`.
-        real_outputs: the references of the Reals among them.
-        free_inputs: the references of the Real inputs, if none of them has a range; else None.
-        has_only_reals: whether all inputs are Reals.
-        only_outputs: the references of all outputs, if these are Reals; else None.
-        parameters: by name.
-        fault: whether a value or a step was discarded.
-        fresh: whether the outputs are up to date: nothing has changed that they depend on.
-        held: whether they are those of the beginning of the last step; the next evaluates its own.
-        groups: the inputs as the equations take them.
-        state: of the component; None before the initialisation.
-        derived: what was derived of it; None: it is to be derived when it is needed.
-        start_time, stop_time, time: where the run begins, where it ends, and where it is [s].
-        noise, draws: the generator of the noise of outputs, None without it, and what it has given.
+        ports: ports of the component, `fault` last.
+        inputs, outputs: values of all inputs, and of all outputs but `fault`.
+        input_references, output_references: their value references, in the same order.
+        places: indices of values in these lists, by value reference.
+        all_outputs: references of all outputs but `fault`.
+        real_outputs: references of the Real outputs.
+        free_inputs: references of the Real inputs, if none of them has a range; else None.
+        has_only_reals: True if all inputs are Reals.
+        only_outputs: references of all outputs, if all are Reals; else None.
+        parameters: values by name.
+        fault: True if a value or a step was discarded.
+        fresh: True if the outputs are up to date.
+        held: True if the outputs belong to the beginning of the last step, so that the next step
+            evaluates its own.
+        groups: the inputs as groups of the equations.
+        state: state of the component; None before the initialisation.
+        derived: values derived from the state; None if they must be derived when needed.
+        start_time, stop_time, time: start, end and present time of the run [s].
+        noise, draws: generator of the noise of outputs, None without noise, and its last draw.
 
     """
 
@@ -121,21 +122,21 @@ class Store:
         self.draws: tuple[float, ...] = ()
 
     def no_outputs(self) -> list[Value]:
-        """The outputs where there is no state."""
+        """Return the outputs before there is a state."""
         return [_NOTHING[self.ports[reference].type] for reference in self.output_references]
 
     def check_outputs(self, values: Sequence[Value]) -> None:
         """Refuse outputs that are not finite.
 
         Raises:
-            Refusal: one of them is not.
+            Refusal: an output is not finite.
 
         """
         for reference, value in zip(self.output_references, values):
-            self.ports[reference].sound(value)
+            self.ports[reference].check_type(value)
 
     def port(self, reference: int, fmi_type: str) -> Port:
-        """The port that has a value reference, if its values are passed by the calls for a type.
+        """Return the port with a value reference, if functions for a type pass its values.
 
         Raises:
             Refusal: there is none.
@@ -145,11 +146,11 @@ class Store:
             port = self.ports[reference]
             if port.type in _PASSED[fmi_type]:
                 return port
-        # PythonFMU hands references from 2^31 over as negative numbers.
+        # PythonFMU passes references from 2^31 as negative numbers.
         raise Refusal(f"no {fmi_type} has the value reference {reference % 2**32}")
 
     def get(self, reference: int, fmi_type: str) -> Value:
-        """The value of a port. Hosts read all outputs with fmi2GetReal.
+        """Return the value of a port; fmi2GetReal returns all types, since some hosts use only it.
 
         Raises:
             Refusal: no port with the reference has a value of this type.
@@ -168,10 +169,10 @@ class Store:
 
 
 def measuring(hint: type) -> Callable[[Any], float]:
-    """A function that gives the sum of the squares of all floats of a state, as C adds them.
+    """Compile a function that adds the squares of all floats of a state, in the order of the C.
 
-    It runs once a step, and written out it costs a third of a loop. It raises OverflowError for an
-    integer that an FMU in C has no room for, and Refusal for one that its enumeration lacks.
+    It runs once a step, and takes a third of the time of a loop. It raises OverflowError for an
+    integer of more than 32 bits, and Refusal for one that its enumeration lacks.
     """
     names, floats, integers = (f"x{i}" for i in count()), [], []
     scope: dict[str, Any] = {"whole": whole, "member": _member}
@@ -204,15 +205,11 @@ def _member(value: int, kind: type[IntEnum]) -> IntEnum:
 
 
 def restored(hint: Any, value: Any) -> Any:
-    """A state, or a part of one, as it was before memory or JSON took it.
-
-    Args:
-        hint: of its type.
-        value: the state or part, perhaps with lists instead of tuples.
+    """Restore a state, or a part of one, from memory, or from JSON, which has lists for tuples.
 
     Raises:
-        Refusal: it is of another type or length, not finite, of more than 32 bits, or not a member
-            of its enumeration.
+        Refusal: it has another type or length, is not finite, has more than 32 bits, or is not a
+            member of its enumeration.
 
     """
     hints, hint = parts_of(hint), class_of(hint)
@@ -244,31 +241,31 @@ def _shown(value: Any) -> str:
 
 
 class Snapshot(TypedDict):
-    """Everything that the rest of a run depends on, fit for JSON."""
+    """Everything that the rest of a run depends on, suitable for JSON."""
 
-    identity: str  #: class and version that it is a state of
+    identity: str  #: class and version of the component
     mode: str
     start_time: float
-    stop_time: float  #: infinite: there is none
+    stop_time: float  #: infinite without a stop time
     time: float
     parameters: dict[str, Value]
     inputs: list[Value]
-    outputs: list[Value]  #: of a sampled component; others follow from what is here
-    fresh: bool  #: whether these are up to date
-    held: bool  #: whether they are those of the last step
+    outputs: list[Value]  #: outputs of a sampled component; other outputs follow from the rest
+    fresh: bool  #: true if these are up to date
+    held: bool  #: true if they belong to the last step
     state: Any  #: NamedTuple of the component, None before the initialisation
-    draws: tuple[float, ...]  #: what the noise of the outputs is made of
-    generator: Any  #: state of the generator of the noise, None without one
+    draws: tuple[float, ...]  #: random numbers in the noise of the outputs
+    generator: Any  #: state of the generator of the noise, None without noise
     fault: bool
 
 
 def _unusable(why: str) -> dict[str, Any]:
-    """A stand-in for a state that cannot be had."""
+    """Return a stand-in for an invalid state."""
     return {_UNUSABLE: why}
 
 
 def to_bytes(snapshot: Mapping[str, Any]) -> bytes:
-    """JSON, which gives every float back bit for bit, with a checksum."""
+    """Write a state as JSON, which keeps all bits of floats, with a checksum."""
     try:
         return _text({**snapshot, _CHECKSUM: _checksum(snapshot)})
     except (TypeError, ValueError, RecursionError) as error:
@@ -276,7 +273,7 @@ def to_bytes(snapshot: Mapping[str, Any]) -> bytes:
 
 
 def from_bytes(content: bytes) -> dict[str, Any]:
-    """The snapshot in the bytes; anything that is not a state is refused when it is set."""
+    """Read a state from bytes; invalid bytes are refused when the state is set."""
     try:
         saved = json.loads(content)
         if not isinstance(saved, dict):
@@ -298,15 +295,9 @@ def _checksum(snapshot: Mapping[str, Any]) -> int:
 
 
 def checked(
-    saved: Mapping[str, Any], identity: str, store: Store, said: Behaviour
+    saved: Mapping[str, Any], identity: str, store: Store, behaviour: Behaviour
 ) -> dict[str, Any]:
-    """A copy of a saved state, if it can be one of this component.
-
-    Args:
-        saved: in memory, or from bytes.
-        identity: of the component.
-        store: of an instance of it.
-        said: how it runs.
+    """Return a copy of a saved state, if it is a possible state of a component.
 
     Raises:
         Refusal: it belongs to another component or version, or no run can have led to it.
@@ -320,7 +311,7 @@ def checked(
         raise Refusal("it has missing or unknown parts")
     mode, state = saved["mode"], saved["state"]
     start_time, stop_time = restored(float, saved["start_time"]), _time(saved["stop_time"])
-    time = _time(saved["time"])  # one that is finite may have a step to one that is not
+    time = _time(saved["time"])  # a step from a finite time may lead to an infinite one
     if mode not in MODES:
         raise Refusal(f"{mode!r:.40} is not a mode")
     if not start_time < stop_time:
@@ -335,9 +326,9 @@ def checked(
         raise Refusal("it has a state before the initialisation")
     if state is None and mode == STEPPING:
         raise Refusal("it has steps without a state")
-    sampled = store.output_references if said.is_sampled and state is not None else []
+    sampled = store.output_references if behaviour.is_sampled and state is not None else []
     draws = restored(
-        GenericAlias(tuple, (float,) * (state is not None) * said.draws), saved["draws"]
+        GenericAlias(tuple, (float,) * (state is not None) * behaviour.draws), saved["draws"]
     )
     check_draws(*draws)
     parameters = saved["parameters"]
@@ -351,19 +342,19 @@ def checked(
         "outputs": _values(store, sampled, saved["outputs"]),
         "fresh": bool(sampled) and saved["fresh"],
         "held": bool(sampled) and saved["held"],
-        "state": None if state is None else restored(said.state, state),
+        "state": None if state is None else restored(behaviour.state, state),
         "draws": draws,
         "generator": _frozen(saved["generator"]),
     }
 
 
 def _time(value: Any) -> Any:
-    """A time, which may be infinite."""
+    """Restore a time, which may be infinite."""
     return value if value in (inf, -inf) else restored(float, value)
 
 
 def _frozen(value: Any) -> Any:
-    """Lists, as JSON gives them, back to the tuples that a generator's state is made of."""
+    """Turn lists from JSON back into the tuples of a generator's state."""
     return tuple(map(_frozen, value)) if isinstance(value, (list, tuple)) else value
 
 
@@ -372,6 +363,6 @@ def _values(store: Store, references: Sequence[int], values: Any) -> list[Value]
         raise Refusal("its values do not match the ports")
     for reference, value in zip(references, values):
         port = store.ports[reference]
-        # An output is in no range: no step looks at one.
-        port.sound(value) if port.causality == "output" else port.checked(value)
+        # Ranges of outputs are not checked, since no step depends on an output.
+        port.check_type(value) if port.causality == "output" else port.checked(value)
     return [*values]

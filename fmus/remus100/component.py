@@ -15,12 +15,12 @@ from auv_fmu.remus.tail import ACTUATOR, __citation__
 
 H_MAX = STEP
 
-#: Largest diameter of a hull per length: near 1, Lamb's factors are differences of equal numbers.
+#: Largest ratio of diameter to length: near 1, Lamb's factors are differences of equal numbers.
 _THICKEST = 0.9
 
 
 class Inputs(NamedTuple):
-    """Commands of fins and propeller, and how the water moves."""
+    """Commands of fins and propeller, and the motion of the water."""
 
     command: Annotated[Vector3, Variable(ACTUATOR, "Command of rudder, stern planes and propeller")]
     water: Annotated[
@@ -32,7 +32,7 @@ class Inputs(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What is seen of the vehicle."""
+    """Motion of the vehicle, and the state of its actuators."""
 
     eta: Annotated[
         Vector6,
@@ -55,12 +55,12 @@ class Outputs(NamedTuple):
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse a hull that is no slender one, or that is heavier at its top."""
+    """Refuse a hull that is not slender, or that is heavier at its top."""
     hull = parameters.hull
     if not hull.diameter <= _THICKEST * hull.length:
         raise Refusal(
             f"diameter = {hull.diameter:g} must be at most {_THICKEST:g} times length = "
-            f"{hull.length:g}: the added mass is that of a slender hull"
+            f"{hull.length:g}: the added mass is for a slender hull"
         )
     if not hull.r_bg[2] > 0.0:
         raise Refusal(
@@ -70,18 +70,18 @@ def check(parameters: Parameters) -> None:
 
 
 def start(parameters: Parameters, inputs: Inputs) -> RemusState:
-    """State at the start."""
+    """Return the state at the start."""
     return remus100.begin(parameters, inputs.water)
 
 
 def update(parameters: Parameters, state: RemusState, inputs: Inputs, h: float) -> RemusState:
-    """State after a step."""
+    """Return the state after a step."""
     command, water, dwater = inputs
     return remus100.advance(parameters, state, command, water, dwater, h)
 
 
 def outputs(parameters: Parameters, state: RemusState) -> Outputs:
-    """What is seen of the vehicle; y has no noise yet."""
+    """Return the outputs; y has no noise yet."""
     y, dy = remus100.control(state, parameters.ell)
     tau = remus100.tail_forces(parameters.tail, state)
     return Outputs(
@@ -96,12 +96,12 @@ def outputs(parameters: Parameters, state: RemusState) -> Outputs:
 
 
 def seed(parameters: Parameters) -> int:
-    """Of the noise."""
+    """Return the seed of the noise."""
     return parameters.noise.seed
 
 
 def measured(parameters: Parameters, y: Vector3, n: Vector3) -> Vector3:
-    """The output y with noise, of three independent standard normal numbers."""
+    """Add noise to the output y, from three independent standard normal numbers."""
     return plant.measure(y, n, parameters.noise.std)
 
 

@@ -16,7 +16,7 @@ from auv_fmu.water.waves import Components
 
 
 class Inputs(NamedTuple):
-    """Where the vehicle is."""
+    """Position of the vehicle."""
 
     eta: Annotated[Vector3, Variable(POSITION, "Position of the vehicle, z down from still water")]
 
@@ -27,28 +27,28 @@ def check(parameters: Sea) -> None:
 
 
 def start(parameters: Sea) -> Variation:
-    """State at the start."""
+    """Return the state at the start."""
     return ocean_current.begin(parameters.current)
 
 
 def derive(parameters: Sea) -> Components:
-    """The waves."""
+    """Return the waves."""
     return sea.regular_waves(parameters)
 
 
 def update(parameters: Sea, state: Variation, h: float) -> Variation:
-    """State after a step."""
+    """Return the state after a step."""
     return ocean_current.advance(parameters.current, state, h)
 
 
 def outputs(
     parameters: Sea, state: Variation, derived: Components, inputs: Inputs, t: float
 ) -> WaterMotion:
-    """How the water moves at the vehicle."""
+    """Return the motion of the water at the vehicle."""
     return sea.water(parameters, derived, state, inputs.eta, t)
 
 
 def check_state(state: Variation) -> None:
-    """Refuse random numbers of no sequence."""
+    """Refuse an invalid state of the random numbers."""
     if not (1.0 <= state.random < MODULUS and fmod(state.random, 1.0) == 0.0):
         raise Refusal("its random numbers are of no sequence")

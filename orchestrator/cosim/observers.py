@@ -26,8 +26,8 @@ from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.variables import TYPES, Standing, StringTable, as_float32
 from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
+from orchestrator.machine.lazy import ROWS_AT_ONCE, parquet
 from orchestrator.machine.operating_system import is_still
-from orchestrator.machine.parquet import ROWS_AT_ONCE, parquet
 
 #: Rows in a block, and the longest time for which rows wait [s].
 _ROWS, _PATIENCE = 512, 0.2

@@ -26,8 +26,8 @@ from orchestrator.cosim.connection import (
 )
 from orchestrator.cosim.experiment import MOST_STEPS, Experiment, Order
 from orchestrator.cosim.variables import Value, Variable
+from orchestrator.machine.disk import plain_file_names
 from orchestrator.machine.errors import InputError, did_you_mean, listed
-from orchestrator.machine.file_names import plain_file_names
 from orchestrator.machine.texts import is_finite
 
 #: For each component, the components whose direct feedthrough feeds it.

@@ -10,10 +10,11 @@ from pathlib import Path
 from string import Template
 
 from auv_fmu import __version__
-from fmus.discovery import REFERENCE, components, licences, package_folder, source_of, write_archive
+from fmus.discovery import REFERENCE, components, licences, source_of, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE
+from orchestrator.machine.compilers import platforms
 from orchestrator.machine.disk import temporary_folder
-from orchestrator.machine.platforms import platforms
+from orchestrator.machine.identity import package_folder
 from orchestrator.runs.bundle import ARCHIVE, build_bundle, write_checksums
 from orchestrator.runs.folder import replace_files
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from orchestrator.figures.panels import Cell, Panel, frame_path, over_time, title
 from orchestrator.figures.style import COLOURS, REFERENCE, Drawn, earth_axes, vehicle_colours
-from orchestrator.vehicle.distances import (
+from orchestrator.vehicle.indices import (
     SMALLEST_DISTANCE_LABEL,
     distances,
     for_distances,

@@ -31,7 +31,7 @@ from orchestrator.figures.study_values import (
     is_logarithmic,
 )
 from orchestrator.figures.style import COLOURS, FIGURE_FORMATS, FIGURE_WIDTH, STYLES, heading
-from orchestrator.machine.file_names import file_name
+from orchestrator.machine.disk import file_name
 
 #: Heights of a row of panels, of a panel by itself, of a row of a matrix and what surrounds it, and
 #: of a bar of colours with its name at least [in].

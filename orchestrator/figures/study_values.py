@@ -13,9 +13,8 @@ import numpy as np
 
 from orchestrator.figures.style import heading, printed_unit
 from orchestrator.vehicle import indices
-from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.index.tracking import REACHED
-from orchestrator.vehicle.indices import Index
+from orchestrator.vehicle.indices import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL, Index
 
 #: Columns of runs.parquet, an array each; what a run does not have is nan or None.
 Columns: TypeAlias = Mapping[str, np.ndarray]

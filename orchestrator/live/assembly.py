@@ -25,8 +25,7 @@ from orchestrator.figures.style import FIN, RINGS, printed_unit
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, last_line, reason
-from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
-from orchestrator.vehicle.indices import metrics
+from orchestrator.vehicle.indices import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL, metrics
 from orchestrator.vehicle.signals import Loop
 
 Plain = dict[str, Any]

@@ -11,12 +11,12 @@ from concurrent.futures import ThreadPoolExecutor
 from hashlib import sha256
 from pathlib import Path
 
-from fmus.discovery import package_folder
 from orchestrator.live.programs import Source
 from orchestrator.machine.cache import made_once
 from orchestrator.machine.compilers import SAME_NUMBERS, zig
 from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.identity import package_folder
 
 #: Category in the cache.
 CATEGORY = "live-module"

@@ -11,8 +11,7 @@ import numpy as np
 from orchestrator.cosim import Table
 from orchestrator.figures.style import Drawn, printed_unit, reference_colours, vehicle_colours
 from orchestrator.live.assembly import Plain, assemble, vehicle_data
-from orchestrator.vehicle.distances import SMALLEST_DISTANCE
-from orchestrator.vehicle.indices import VEHICLES, metrics
+from orchestrator.vehicle.indices import SMALLEST_DISTANCE, VEHICLES, metrics
 from orchestrator.vehicle.signals import Loop, real_parameter
 
 #: A page holds so many numbers, of all runs together: of longer ones fewer rows.

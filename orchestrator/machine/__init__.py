@@ -1,1 +1,1 @@
-"""What any program needs of the operating system, of files and of texts; it knows no FMU."""
+"""The operating system, files, processes, compilers and texts: nothing here depends on FMI."""

@@ -1,9 +1,9 @@
 """Libraries, machine code and FMUs, made once and kept in the user's cache folder.
 
-All of it is run, so it is taken only from folders and files that nobody but the user can write,
-and only if it is unchanged. Nothing there is ever overwritten or removed: what was changed is made
-anew, under another name. What came with the installation, ready for use, is taken first, and
-trusted like the code beside it.
+All of it is executed, so it is read only from folders and files that no other user can write, and
+only if it is unchanged. Nothing is ever overwritten or removed there: a file that was changed is
+made again, under another name. Files that were installed with the package, ready for use, are
+preferred, and trusted like its code.
 """
 
 from __future__ import annotations
@@ -19,17 +19,20 @@ from pathlib import Path
 from shutil import rmtree
 from stat import S_ISDIR, S_ISLNK, S_ISREG, S_ISVTX
 from tempfile import mkdtemp
+from typing import TypeVar
 
 from platformdirs import user_cache_path
 
 from orchestrator.machine.disk import hold_lock, process_folder
 from orchestrator.machine.operating_system import is_mine, others_write, sync_to_disk
 
-#: What came with the installation: a folder for each category, in it one for each key.
+#: Installed files: a folder for each category, in it one for each key.
 _READY = Path(__file__).parents[1] / "ready"
 
-#: The file beside those that are kept, with their digests. Written last: where it is, all are.
+#: The file with the digests of the others in a folder, written last: if it exists, all do.
 _DIGESTS = ".sha256.json"
+
+T = TypeVar("T")
 
 
 def users_folder() -> Path:
@@ -38,11 +41,11 @@ def users_folder() -> Path:
 
 
 def read_cached(category: str, key: str) -> dict[Path, bytes]:
-    """Read the files that are kept under a key; none if they are not as they were kept.
+    """Read the files that are kept under a key; empty if there are none, or one was changed.
 
     Args:
-        category: of what is kept, a name of a folder.
-        key: of all that it was made of.
+        category: name of a folder for files of one kind.
+        key: hash of everything that they were made of.
 
     """
     with suppress(OSError):
@@ -79,22 +82,36 @@ def write_cached(category: str, key: str, files: Mapping[str, bytes]) -> list[Pa
 
 
 def made_once(category: str, key: str, make: Callable[[], Mapping[str, bytes]]) -> dict[str, Path]:
-    """Return the paths of files by their names; they are made and kept if they are not there.
+    """Return the paths of files by their names; files that are not kept yet are made first.
 
     Raises:
         OSError: they cannot be written.
 
     """
-    found = [*read_cached(category, key)]
-    if not found:
-        with hold_lock(category_folder(category), wait=True):
-            # Another process may have been first.
-            found = [*read_cached(category, key)] or write_cached(category, key, make())
+    found = found_or_made(
+        category,
+        lambda: [*read_cached(category, key)],
+        lambda: write_cached(category, key, make()),
+    )
     return {path.name: path for path in found}
 
 
+def found_or_made(category: str, find: Callable[[], T | None], make: Callable[[], T]) -> T:
+    """Return the result of `find`, or else of `make`, which one process at a time calls.
+
+    Raises:
+        OSError: the folder of the category cannot be written.
+
+    """
+    if found := find():
+        return found
+    with hold_lock(category_folder(category), wait=True):
+        # Another process may have been first.
+        return find() or make()
+
+
 def category_folder(category: str) -> Path:
-    """Return the folder of a category, made if it is not there.
+    """Return the folder of a category, made if it is missing.
 
     Raises:
         OSError: it cannot be made.
@@ -109,13 +126,13 @@ def category_folder(category: str) -> Path:
 
 
 def environment() -> dict[str, str]:
-    """Return what processes that work for this one need in their environment."""
+    """Return the environment variables that child processes need to find the same cache."""
     root = _root("")
     return {} if root == users_folder() else {"XDG_CACHE_HOME": str(root.parent)}
 
 
 def _kept_in(folder: Path) -> dict[Path, bytes]:
-    """Read the files that are kept in a folder; none if one of them is not as it was kept."""
+    """Read the files that are kept in a folder; empty if one of them was changed."""
     try:
         if not _keeps_others_out(folder.lstat(), above=False):
             return {}
@@ -166,21 +183,21 @@ def _root(category: str) -> Path:
         )
     else:
         return path
-    # Processes that work for another do not repeat it.
+    # Child processes do not repeat the warning.
     if parent_process() is None:
         warnings.warn(f"nothing is cached, because {why}", stacklevel=1)
     return process_folder() / path.name
 
 
 def _open_to_others(path: Path, n_within: int) -> Path | None:
-    """Return the first part of the path of a folder where others could put something of theirs.
+    """Return the first folder on the way to a folder into which other users can put files.
 
-    Above the cache folder there may be folders of root's and links, and folders such as /tmp, where
-    nobody can move what others have.
+    Folders above the cache folder may be links or belong to root, or be like /tmp, where users
+    cannot rename each other's files.
 
     Args:
-        path: of the folder.
-        n_within: how many of its last parts are not above the cache folder.
+        path: path of the folder.
+        n_within: number of its last parts that are not above the cache folder.
 
     """
     parts = [*reversed(path.parents), path]
@@ -198,19 +215,13 @@ def _open_to_others(path: Path, n_within: int) -> Path | None:
             elif not _keeps_others_out(status, above):
                 return part
         except OSError:
-            # What is not there is made; what cannot be reached is said when it is written.
+            # A missing folder will be made; an unreachable one is reported on writing.
             return None
     return None
 
 
 def _keeps_others_out(status: os.stat_result, above: bool) -> bool:
-    """Tell whether only the user can change what is in a folder.
-
-    Args:
-        status: of the folder.
-        above: whether it is above the cache folder.
-
-    """
+    """Return True if only the user can change a folder, which may be above the cache folder."""
     mine = is_mine(status, or_roots=above)
     open_to_others = others_write(status) and not (above and status.st_mode & S_ISVTX)
     # A file in place of a folder is reported when something is written into it.

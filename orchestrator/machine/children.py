@@ -1,7 +1,7 @@
 """Child processes that run modules of Python, and end with this process.
 
-Run as a module, `python -m orchestrator.machine.children MODULE ...`, it is the child. Nothing here
-takes code or settings from the current folder, which may be someone else's.
+`python -m orchestrator.machine.children MODULE ...` is the child's command. No code or settings are
+read from the current folder, which may belong to someone else.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from orchestrator.machine.operating_system import wait_for_end
 
 
 def imported_apart(module: str, file: str) -> None:
-    """Import a module in another folder, if the current one has a file that it would read."""
+    """Import a module from another working directory if this one has a file that it would read."""
     if module in sys.modules or not os.path.lexists(file):
         return
     current = Path.cwd()
@@ -43,13 +43,13 @@ def run_module(
     """Run a module to its end; an exception here, such as Ctrl-C, ends it at once.
 
     Args:
-        module: as after `python -m`.
-        arguments: of its command line.
+        module: its name, as after `python -m`.
+        arguments: arguments of its command line.
         hear: called with each line of its output as it comes.
-        timeout: how long it may take [s], unless it is heard; None: without limit.
+        timeout: its time limit [s], for calls without `hear`; None: no limit.
 
     Raises:
-        TimeoutExpired: it took longer, and was ended.
+        TimeoutExpired: it took longer, and was killed.
         OSError: no process can be started.
 
     """
@@ -78,8 +78,8 @@ def run_module(
 
 @contextmanager
 def _tie() -> Iterator[dict[str, Any]]:
-    """Tie a child to this process, and its temporary files to its own end."""
-    # The child reads from a pipe of which only this process has the other end.
+    """Make the child end with this process, and remove its temporary files when it ends."""
+    # The child reads from a pipe; only this process holds the other end.
     end_of_child, end_of_ours = os.pipe()
     try:
         with temporary_folder() as temporary:
@@ -87,7 +87,7 @@ def _tie() -> Iterator[dict[str, Any]]:
                 "stdin": end_of_child,
                 "encoding": "utf-8",
                 "errors": "replace",
-                # Windows would choose a code page, which has few letters for the names of files.
+                # Windows would choose a code page that lacks many letters of file names.
                 "env": os.environ | {"TMPDIR": str(temporary), "PYTHONIOENCODING": "utf-8"},
             }
     finally:
@@ -96,7 +96,7 @@ def _tie() -> Iterator[dict[str, Any]]:
 
 
 def _follow() -> None:
-    """End with the process that has started this one."""
+    """Wait for the end of the parent process, then exit."""
     wait_for_end(sys.stdin.fileno())
     os._exit(1)
 

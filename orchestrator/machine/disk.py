@@ -1,7 +1,7 @@
-"""Files and folders that outlast crashes: atomic writes, checksums, locks and temporary folders.
+"""Files and folders: names, checksums, atomic writes, locks and temporary folders.
 
-A process that works on a folder holds a lock on it, which ends with the process, however that
-ends. So a temporary folder without a lock belongs to a process that was killed, and goes.
+A process that works on a folder holds a lock on it, which ends with the process, even if that is
+killed. So a temporary folder without a lock was left by a killed process, and is removed.
 """
 
 from __future__ import annotations
@@ -9,7 +9,8 @@ from __future__ import annotations
 import atexit
 import errno
 import json
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import file_digest, sha256
@@ -26,17 +27,24 @@ from orchestrator.machine.operating_system import is_mine, rename_to_new, sync_t
 if TYPE_CHECKING:
     from filelock import BaseFileLock
 
-#: The file in a folder that is locked: empty, and removed at the end.
+#: The lock file of a folder: empty, and removed at the end.
 LOCK = ".auv-fmu.lock"
 
 #: Errors of file systems without locks.
 _NO_LOCKS = (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS)
 
-#: Entry of a record with its checksum.
+#: Key of the checksum in a record.
 _SEAL = "sha256"
 
 #: Prefix of temporary folders, and the file in each that holds its name.
 _PREFIX, _MARKER = "auvfmu-", ".auv-fmu.json"
+
+#: Letters that some system does not accept in file names, and names that Windows reserves.
+_ODD = re.compile(r"[^\w .()+=,@~-]")
+_RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.I)
+
+#: Longest name [bytes], which leaves room for suffixes.
+_LONGEST = 120
 
 #: Threads must not make a temporary folder each; reentrant, since a signal handler may need it.
 _MAKING = RLock()
@@ -54,7 +62,7 @@ def unsealed(text: str) -> dict[str, Any]:
     """Read a record that :func:`sealed` has written.
 
     Raises:
-        ValueError: it was changed since, or is no such record.
+        ValueError: it was changed since, or is not such a record.
 
     """
     content = json.loads(text)
@@ -70,7 +78,7 @@ def _checksum(content: Mapping[str, Any]) -> str:
 
 
 def sha256_of(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     with path.open("rb") as file:
         return file_digest(file, "sha256").hexdigest()
 
@@ -78,20 +86,51 @@ def sha256_of(path: Path) -> str:
 # Files
 
 
+def file_name(name: str, taken: Collection[str] = ()) -> str:
+    """Return a file name that every system accepts, and that no other name is turned into.
+
+    It differs from the names that are taken in the same folder.
+    """
+    plain = _ODD.sub("_", name).strip(" ").rstrip(".")
+    plain = plain.encode()[:_LONGEST].decode(errors="ignore")
+    if not plain or plain.startswith(".") or _RESERVED.match(plain):
+        plain = f"_{plain}"
+    if plain != name:
+        plain += f"-{sha256(name.encode(errors='surrogatepass')).hexdigest()[:8]}"
+    others = {other.casefold() for other in taken}
+    while plain.casefold() in others:
+        plain += "_"
+    return plain
+
+
+def plain_file_names(names: Iterable[str], *taken: str) -> list[str]:
+    """Return file names that need no encoding in a URI: some hosts do not decode URIs.
+
+    No two are equal or differ in case only, since some file systems ignore case.
+    """
+    found: list[str] = []
+    used = {name.lower() for name in taken}
+    for name in names:
+        base = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
+        free, number = base, len(found)
+        while free.lower() in used:
+            free, number = f"{number}_{base}", number + 1
+        found.append(free)
+        used.add(free.lower())
+    return found
+
+
 def write_whole(path: Path, text: str, partial: Path) -> None:
     """Write a text file atomically: after a crash it holds the old text or the new one.
 
-    Args:
-        path: of the file.
-        text: its new content.
-        partial: a name in the same folder that nobody else uses, for the unfinished file.
+    The unfinished file `partial` is in the same folder, and nothing else uses its name.
 
     Raises:
         OSError: it cannot be written.
 
     """
     partial.unlink(missing_ok=True)
-    # Never through a link, which could lead anywhere.
+    # "x" follows no link, which could lead anywhere.
     with partial.open("x", encoding="utf-8") as file:
         file.write(text)
     sync_to_disk(partial)
@@ -100,7 +139,7 @@ def write_whole(path: Path, text: str, partial: Path) -> None:
 
 
 def move_aside(path: Path) -> Path:
-    """Rename a file or folder of the user's to NAME.~N~, and return the new path.
+    """Rename a user's file or folder to NAME.~N~, and return the new path.
 
     Raises:
         OSError: it cannot be renamed.
@@ -119,11 +158,7 @@ def move_aside(path: Path) -> Path:
 
 @contextmanager
 def hold_lock(folder: Path, wait: bool = False) -> Iterator[None]:
-    """Keep other processes out of a folder.
-
-    Args:
-        folder: which exists.
-        wait: for another process that is in it.
+    """Keep other processes out of an existing folder; with `wait`, wait until none is in it.
 
     Raises:
         BlockingIOError: another process is in it.
@@ -136,13 +171,13 @@ def hold_lock(folder: Path, wait: bool = False) -> Iterator[None]:
     except TimeoutError:
         raise BlockingIOError(errno.EAGAIN, "another process is in it") from None
     except OSError as error:
-        # Where there are no locks, nobody is kept out.
+        # On a file system without locks, continue without one.
         if error.errno not in _NO_LOCKS:
             raise
     try:
         yield
     finally:
-        # While it is locked: later, it could be another process's.
+        # Before the release: later it could belong to another process.
         is_open = not _remove_lock(folder / LOCK)
         _release(lock)
         if is_open:
@@ -150,7 +185,7 @@ def hold_lock(folder: Path, wait: bool = False) -> Iterator[None]:
 
 
 def _remove_lock(path: Path) -> bool:
-    """Remove a lock file, unless the user has written into it; False: Windows says it is open."""
+    """Remove a lock file if it is empty; False if Windows refuses because it is open."""
     with suppress(FileNotFoundError):
         try:
             if path.is_file() and not path.is_symlink() and not path.stat().st_size:
@@ -175,7 +210,7 @@ def _lock_of(folder: Path) -> BaseFileLock:
 
 @contextmanager
 def temporary_folder() -> Iterator[Path]:
-    """Provide a temporary folder for the context, which goes even if the process is killed."""
+    """Provide a temporary folder for the context; it is removed even if the process is killed."""
     with TemporaryDirectory(dir=process_folder(), ignore_cleanup_errors=True) as folder:
         yield Path(folder)
 
@@ -191,7 +226,7 @@ def _process_folder() -> TemporaryDirectory[str]:
     _remove_left()
     folder = TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
     path = Path(folder.name)
-    # Without a marker, no other process removes it.
+    # If no marker can be written, no other process will remove it.
     with suppress(OSError):
         lock = _lock_of(path)
         lock.acquire(blocking=False)
@@ -220,7 +255,7 @@ def _remove_left() -> None:
 
 
 def _is_ours(folder: Path) -> bool:
-    """Whether a process of this user has made a temporary folder: its marker holds its name."""
+    """Return True if a process of this user made a temporary folder: its marker has its name."""
     marker, status = folder / _MARKER, folder.lstat()
     if not (S_ISDIR(status.st_mode) and is_mine(status)) or marker.is_symlink():
         return False

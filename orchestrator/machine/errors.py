@@ -1,4 +1,4 @@
-"""Errors in words for the user, and all problems of a file, collected."""
+"""Errors with messages for the user, and the collected problems of a file."""
 
 from __future__ import annotations
 
@@ -7,21 +7,19 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 
-#: How many lines of a long text, such as the problems of a description, are shown, and how many
-#: letters of each.
+#: Largest number of lines of a message, and of letters of each.
 _MOST_LINES, _LONGEST_LINE = 10, 300
 
-
-#: Of many names, this many are shown.
+#: Largest number of names in a list.
 _MOST_NAMES = 5
 
 
 class InputError(ValueError):
-    """The user asked for something that cannot be done; the text says what to change."""
+    """A request that cannot be fulfilled; the message tells the user what to change."""
 
 
 class StartError(InputError):
-    """A simulation has failed before its first row, though all that was asked for can be done."""
+    """A simulation that failed before its first row, though the request was valid."""
 
 
 def reason(error: BaseException) -> str:
@@ -30,15 +28,15 @@ def reason(error: BaseException) -> str:
         return "out of memory"
     lines = [line.strip() for line in str(error).splitlines() if line.strip()]
     more = [f"and {len(lines) - _MOST_LINES} more lines"] * (len(lines) > _MOST_LINES)
-    said = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
-    return "; ".join(said).replace(":; ", ": ") or repr(error)
+    shown = (shortened(line, _LONGEST_LINE) for line in (*lines[:_MOST_LINES], *more))
+    return "; ".join(shown).replace(":; ", ": ") or repr(error)
 
 
 def unforeseen(error: Exception) -> str:
     """Return the message of an exception during a run in one line.
 
-    Only a full disk and lack of memory are foreseen there. An FMU may have closed files of this
-    process, or changed modules of Python.
+    Only a full disk and lack of memory are expected there. For others an FMU may be the cause: it
+    may have closed files of this process, or changed modules of Python.
     """
     if isinstance(error, InputError | MemoryError):
         return reason(error)
@@ -56,19 +54,13 @@ def shortened(text: str, most: int = 80) -> str:
 
 
 def listed(names: Sequence[str], between: str = ", ") -> str:
-    """Names, of many the first, with something between them."""
+    """Join names, of many the first ones and the number of the rest."""
     more = len(names) - _MOST_NAMES
     return between.join(names[:_MOST_NAMES]) + (f" and {more} more" if more > 0 else "")
 
 
 def escape_unprintable(text: str, allowed: str = "") -> str:
-    """Escape control characters, which the terminal would obey.
-
-    Args:
-        text: to be shown.
-        allowed: letters that may stay, though they are not printed.
-
-    """
+    """Escape control characters, which a terminal would interpret, except the allowed ones."""
     return "".join(
         letter if letter.isprintable() or letter in allowed else repr(letter)[1:-1]
         for letter in text
@@ -76,13 +68,13 @@ def escape_unprintable(text: str, allowed: str = "") -> str:
 
 
 def last_line(text: str, otherwise: str = "no reason given") -> str:
-    """Return the last line that a child process has written, the reason why it failed."""
+    """Return the last line that a child process has written, in which it says why it failed."""
     lines = text.strip().splitlines()
     return lines[-1] if lines else otherwise
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Return a hint at names that resemble a mistaken one or begin with it; empty if none does."""
+    """Return a hint at names that resemble an unknown one or begin with it; empty if none do."""
     names = list(known)
     members = [other for other in names if other.startswith((f"{name}[", f"{name}."))]
     same = [other for other in names if other.casefold() == name.casefold()]
@@ -91,10 +83,10 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 class Refused(InputError):
-    """Something has problems; the message is the first of them."""
+    """A file or system with problems; the message contains the first of them."""
 
     def __init__(self, *problems: str) -> None:
-        """Make the message of the first problem and the number of others."""
+        """Take all problems."""
         self.problems = problems
         more = len(problems) - 1
         others = f" (and {more} more: see `auv-fmu check`)" if more else ""
@@ -115,20 +107,20 @@ class Findings:
         self._strict = strict
         self.problems: list[str] = []
         self.notes: list[str] = []
-        self._said: dict[str, set[str]] = {"problem": set(), "note": set()}
+        self._known: dict[str, set[str]] = {"problem": set(), "note": set()}
 
     def problem(self, text: str) -> None:
         """Add a problem that makes a run meaningless or impossible."""
-        if text not in self._said["problem"]:
-            self._said["problem"].add(text)
+        if text not in self._known["problem"]:
+            self._known["problem"].add(text)
             self.problems.append(text)
 
     def note(self, text: str) -> None:
         """Add a problem that changes no number."""
         if self._strict:
             self.problem(text)
-        elif text not in self._said["note"]:
-            self._said["note"].add(text)
+        elif text not in self._known["note"]:
+            self._known["note"].add(text)
             self.notes.append(text)
 
     @contextmanager

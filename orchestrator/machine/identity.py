@@ -1,4 +1,4 @@
-"""Identities of runs: what decides their numbers, and the digest of code."""
+"""Identities of runs: everything that determines their numbers, and digests of code."""
 
 from __future__ import annotations
 
@@ -9,32 +9,38 @@ from hashlib import sha256
 from importlib.util import find_spec
 from pathlib import Path
 
-#: Packages whose versions the rows depend on.
+#: Packages whose versions determine the rows of a run.
 PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
 
-#: All that decides the numbers of a run: by names in words, each as text.
+#: Everything that determines the numbers of a run, as texts by their names.
 Identity = Mapping[str, str]
 
 
 def differences(one: Identity, other: Identity) -> list[str]:
-    """What makes two runs two, by the names of an identity."""
+    """Return the sorted names of the entries in which two identities differ."""
     return sorted(dict(one.items() ^ other.items()))
 
 
 def digest_of(*identities: Identity) -> str:
-    """An identity, or several in their order, as a short text."""
+    """Return the SHA-256 of identities, in their order."""
     return sha256(json.dumps(identities, sort_keys=True).encode()).hexdigest()
+
+
+def package_folder(package: str) -> Path:
+    """Return the folder of an installed package; only its parent packages are imported."""
+    specification = find_spec(package)
+    assert specification is not None and specification.submodule_search_locations
+    [folder] = specification.submodule_search_locations
+    return Path(folder)
 
 
 @cache
 def code_of(*packages: str) -> str:
-    """Digest of the code of some packages, in Python and C."""
+    """Return a digest of the Python and C sources of packages."""
     digest = sha256()
     for package in packages:
-        specification = find_spec(package)
-        assert specification is not None and specification.submodule_search_locations
-        [root] = specification.submodule_search_locations
-        found = (path for path in Path(root).rglob("*") if path.suffix in (".c", ".h", ".py"))
+        root = package_folder(package)
+        found = (path for path in root.rglob("*") if path.suffix in (".c", ".h", ".py"))
         for path in sorted(found):
             digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode())
             digest.update(path.read_bytes())

@@ -13,7 +13,7 @@ from typing import Any
 
 from orchestrator.machine.operating_system import is_still, never_wait_for_pipe
 
-#: Ctrl-C, what a batch system sends, the end of the terminal, and Ctrl-Break of Windows.
+#: Signals to stop: from Ctrl-C, a batch system, a closed terminal, and Ctrl-Break on Windows.
 _STOPS = [
     getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if hasattr(signal, n)
 ]
@@ -25,10 +25,10 @@ _ENDS = [
     if hasattr(signal, n)
 ]
 
-#: After so many signals, the process ends at once.
+#: Number of signals after which the process ends at once.
 _INSISTENCE = 3
 
-#: Time that an FMU has from the first signal on to return from its step [s]: several signals may
+#: Time after the first signal in which an FMU can return from its step [s]: several signals may
 #: come at once, from a key held down or from a batch system, and the machine may be busy.
 _PATIENCE = 2.0
 
@@ -44,8 +44,8 @@ class Interrupts:
     the loop asks after every step whether there are any.
 
     Attributes:
-        numbers: of the signals, in their order.
-        hand_over: passes the last rows to observers, before the process is given up.
+        numbers: signal numbers in the order of arrival.
+        hand_over: passes the last rows to observers before the process is killed.
 
     """
 
@@ -56,16 +56,16 @@ class Interrupts:
         self.hand_over: Callable[[], None] = lambda: None
 
     def __bool__(self) -> bool:
-        """Whether the work is to end."""
+        """Return True if the work should stop."""
         return bool(self.numbers)
 
     @property
     def urgent(self) -> bool:
-        """Whether it is to end quickly: for a second signal, or one not from the keyboard."""
+        """True if it should stop quickly: after a second signal, or one not from the keyboard."""
         return len(self.numbers) > 1 or any(number != signal.SIGINT for number in self.numbers)
 
     def __str__(self) -> str:
-        """Name the first signal, if it is not one that a user sends."""
+        """Return the name of the first signal, if it is not one that a user sends."""
         first = self.numbers[0] if self.numbers else 0
         if first not in _ENDS:
             return ""
@@ -74,12 +74,12 @@ class Interrupts:
 
     @contextmanager
     def insistence(self, give_up: Callable[[], None]) -> Iterator[None]:
-        """Within the context, the third signal ends the process, whatever an FMU does.
+        """End the process on the third signal within the context, even while an FMU computes.
 
-        It ends no earlier than two seconds after the first signal.
+        It ends two seconds after the first signal at the earliest.
 
         Args:
-            give_up: ends the process, from another thread.
+            give_up: function that ends the process, called from another thread.
 
         """
         if threading.current_thread() is not threading.main_thread():
@@ -93,15 +93,15 @@ class Interrupts:
         # A thread, because Python handles no signal while an FMU computes.
         arguments = (end_of_thread, give_up, leaving)
         with suppress(RuntimeError):
-            # If none can be started, a third signal does nothing.
+            # If no thread can be started, a third signal does nothing.
             threading.Thread(target=self._count, args=arguments, daemon=True).start()
         try:
             yield
         finally:
-            # Not while it is giving up.
+            # Wait if `give_up` is being called.
             leaving.acquire()
             signal.set_wakeup_fd(before)
-            # An FMU may have closed it: by now it may be another file.
+            # An FMU may have closed it, and the number may belong to another file.
             if is_still(end_of_signals, status):
                 os.close(end_of_signals)
 
@@ -131,13 +131,13 @@ class Interrupts:
 
 @contextmanager
 def orderly_end(of_process: bool) -> Iterator[None]:
-    """Within the context, exit normally on SIGTERM and SIGHUP.
+    """Exit normally on SIGTERM and SIGHUP within the context.
 
-    Temporary files are removed then, and child processes end.
+    Temporary files are then removed, and child processes end.
 
     Args:
-        of_process: whether the process ends after the context. Signals to stop are ignored then;
-            otherwise they are handled as before.
+        of_process: True if the process ends after the context. Signals to stop are then ignored;
+            otherwise the former handlers are restored.
 
     """
     if threading.current_thread() is not threading.main_thread():
@@ -164,15 +164,15 @@ def _leave(number: int, _frame: Any) -> None:
 def held_interrupts(
     announce: Callable[[Interrupts], None] | None = None, *, is_last: bool = False
 ) -> Iterator[Interrupts]:
-    """Collect signals to stop while the context lasts.
+    """Collect signals to stop within the context.
 
-    Within another such context the signals go to the outer one. Signals reach the main
-    thread only: elsewhere nothing is held.
+    Inside another such context, the outer one collects them. Signals reach the main thread only;
+    in other threads nothing is collected.
 
     Args:
         announce: called at once when a signal comes.
-        is_last: whether they are ignored after it, until the context of :func:`orderly_end` is
-            left; otherwise they are handled as before.
+        is_last: True to ignore signals afterwards, until the context of :func:`orderly_end` ends;
+            otherwise the former handlers are restored.
 
     """
     if threading.current_thread() is not threading.main_thread():
@@ -183,7 +183,7 @@ def held_interrupts(
         yield outer
         return
     interrupts = Interrupts(announce)
-    # Ignored signals stay so: nohup, or a shell's background.
+    # Signals that are ignored stay so, for nohup and background jobs.
     heeded = [n for n in _STOPS if signal.getsignal(n) not in (signal.SIG_IGN, None)]
     heeded += [n for n in _ENDS if signal.getsignal(n) is signal.SIG_DFL]
     before = {number: signal.signal(number, interrupts.take) for number in heeded}

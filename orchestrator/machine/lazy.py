@@ -1,20 +1,27 @@
-"""Names that a package offers, imported on first use."""
+"""Imports that wait until something is used: names of a package, progress bars, Parquet."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+from orchestrator.machine.errors import InputError
+
+#: Rows of a Parquet file that are read, or written, at once.
+ROWS_AT_ONCE = 8192
 
 
 def offered(
     package: str, modules: Mapping[str, str]
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Make the `__getattr__` and `__dir__` of a package.
+    """Return the `__getattr__` and `__dir__` of a package that imports names on first use.
 
     Args:
         package: its name.
-        modules: names with spaces between them, by the modules in it that have them.
+        modules: names separated by spaces, by the modules that define them.
 
     """
     places = {name: module for module, names in modules.items() for name in names.split()}
@@ -28,3 +35,21 @@ def offered(
         return sorted({*vars(sys.modules[package]), *places})
 
     return getattr_, dir_
+
+
+def progress_bar(**options: Any) -> Any:
+    """Return a bar of tqdm: a widget in a notebook that has widgets, else a line on a terminal."""
+    is_widget = "ipykernel" in sys.modules and find_spec("ipywidgets") is not None
+    return import_module("tqdm.notebook" if is_widget else "tqdm").tqdm(**options)
+
+
+def parquet() -> Any:
+    """Return the module that reads and writes Parquet.
+
+    Raises:
+        InputError: it is not installed.
+
+    """
+    if find_spec("pyarrow") is None:
+        raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
+    return import_module("pyarrow.parquet")

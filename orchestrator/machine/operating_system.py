@@ -1,6 +1,6 @@
-"""Differences between operating systems: no other module asks which one there is.
+"""Differences between operating systems: only this module and `compilers` test which one runs.
 
-All branches of Linux are tested, those of Windows under wine, and those of macOS with fakes only.
+All branches for Linux are tested, the ones for Windows under wine, and for macOS with fakes only.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from typing import Any
 #: Errors of file systems without fsync.
 _CANNOT = (errno.EINVAL, errno.ENOTSUP)
 
-#: Modes of a file or folder that others than its owner can write.
+#: Mode bits of files that other users than their owner can write.
 _OTHERS_WRITE = S_IWGRP | S_IWOTH
 
-#: Interval at which a pipe of Windows is looked at [s].
+#: Polling interval of a pipe on Windows [s].
 _INTERVAL = 0.1
 
-#: Windows waits for at most 63 handles at once; two are for the process that starts the others.
+#: Windows waits for at most 63 handles at once, and the starting process needs two of them.
 _MOST_PROCESSES = 61
 
 
 def can_isolate() -> bool:
-    """Whether processes inherit sockets by their numbers."""
+    """Return True if child processes inherit sockets by their numbers."""
     return sys.platform != "win32"
 
 
@@ -41,14 +41,14 @@ def can_isolate() -> bool:
 
 
 def sync_to_disk(path: Path) -> None:
-    """Flush a file, or the names in a folder, to the disk, so that it outlasts a power cut.
+    """Flush a file, or the names in a folder, to the disk, so that it survives a power cut.
 
     Raises:
-        OSError: the disk has not taken all of it; some file systems say so only now.
+        OSError: it could not be written; some file systems report that only now.
 
     """
     if sys.platform == "win32":
-        # NTFS writes names itself, and a folder cannot be opened.
+        # NTFS writes names by itself, and folders cannot be opened.
         if not path.is_dir():
             with path.open("r+b") as file:
                 os.fsync(file.fileno())
@@ -65,7 +65,7 @@ def sync_to_disk(path: Path) -> None:
 
 def _sync(descriptor: int) -> None:
     if sys.platform == "darwin":
-        # There fsync does not flush the drive; not every file system knows F_FULLFSYNC.
+        # On macOS fsync does not flush the drive, and some file systems lack F_FULLFSYNC.
         fcntl = import_module("fcntl")
         with suppress(OSError):
             fcntl.fcntl(descriptor, fcntl.F_FULLFSYNC)
@@ -77,7 +77,7 @@ def rename_to_new(path: Path, new: Path) -> None:
     """Rename a file or folder without replacing another one.
 
     Raises:
-        FileExistsError: there is one of the new name.
+        FileExistsError: the new name is taken.
         OSError: it cannot be renamed.
 
     """
@@ -88,26 +88,26 @@ def rename_to_new(path: Path, new: Path) -> None:
         new.mkdir()
     else:
         new.touch(exist_ok=False)
-    # Replaces only what was made just now.
+    # This replaces only the empty file or folder made above.
     path.replace(new)
 
 
 def is_still(descriptor: int, status: os.stat_result) -> bool:
-    """Tell whether a descriptor is still the same open file: an FMU may have closed it."""
+    """Return True if a descriptor is still the same open file: an FMU may have closed it."""
     with suppress(OSError):
         return os.path.samestat(os.fstat(descriptor), status)
     return False
 
 
 def is_mine(status: os.stat_result, or_roots: bool = False) -> bool:
-    """Tell whether a file belongs to this user; on Windows always, as its folder decides that."""
+    """Return True if a file belongs to this user; always on Windows, where its folder decides."""
     if sys.platform == "win32":
         return True
     return status.st_uid in ((os.geteuid(), 0) if or_roots else (os.geteuid(),))
 
 
 def others_write(status: os.stat_result) -> bool:
-    """Tell whether other users can write a file or folder; on Windows they never can."""
+    """Return True if other users can write a file or folder; never on Windows."""
     return sys.platform != "win32" and bool(status.st_mode & _OTHERS_WRITE)
 
 
@@ -115,7 +115,7 @@ def others_write(status: os.stat_result) -> bool:
 
 
 def most_processes() -> int:
-    """Largest number of worker processes."""
+    """Return the largest number of worker processes."""
     return _MOST_PROCESSES if sys.platform == "win32" else sys.maxsize
 
 
@@ -127,7 +127,7 @@ def never_wait_for_pipe(descriptor: int) -> None:
 
 @contextmanager
 def without_interrupt() -> Iterator[None]:
-    """Start threads and processes that do not receive Ctrl-C, which only this process answers."""
+    """Start threads and processes in the context that do not receive Ctrl-C."""
     if sys.platform == "win32":
         # Child processes inherit this setting.
         windows: Any = ctypes
@@ -146,7 +146,7 @@ def without_interrupt() -> Iterator[None]:
 
 
 def wait_for_end(pipe: int) -> None:
-    """Wait until the other end of a pipe is closed, which nothing is written to."""
+    """Wait until the other end of a pipe that carries no data is closed."""
     if sys.platform == "win32":
         # A thread that reads would block all others that use the pipe.
         handle = import_module("msvcrt").get_osfhandle(pipe)
@@ -160,7 +160,7 @@ def wait_for_end(pipe: int) -> None:
 
 
 def end_first_without_memory() -> None:
-    """Have the system end this process before others if memory is short."""
+    """Ask the system to kill this process before others if memory runs out."""
     if sys.platform == "linux":
         with suppress(OSError):
             Path("/proc/self/oom_score_adj").write_text("1000")
@@ -170,7 +170,7 @@ def end_first_without_memory() -> None:
 
 
 def floating_point_calls() -> tuple[Callable[..., object], ...]:
-    """C functions that reset, get and set the floating-point mode."""
+    """Return the C functions that reset, get and set the floating-point mode."""
     if sys.platform == "win32":
         c = ctypes.PyDLL("ucrtbase")
         return c._fpreset, c.fegetenv, c.fesetenv

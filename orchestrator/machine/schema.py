@@ -1,7 +1,7 @@
-"""Schemas of TOML files: what each entry may hold and means, and the flaws of a file.
+"""Schemas of TOML files: types and meanings of entries, and messages about wrong ones.
 
-A table is a model of pydantic, from which `tools/pages.py` writes pages and editors' JSON schemas.
-Pydantic takes a moment to import, so a module of schemas is imported when there is a file to read.
+A table is a pydantic model, from which `tools/pages.py` writes pages and JSON schemas for editors.
+Pydantic is slow to import, so modules with schemas are imported when there is a file to read.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from pydantic_core import CoreSchema, ErrorDetails, core_schema
 
 from orchestrator.machine.errors import Findings, did_you_mean, shortened
 
-#: A text that names something, which messages and pages say of it.
+#: A text that is a name; messages and pages call it so.
 Name = Annotated[str, "name"]
 Names = Name | list[Name]
 
@@ -29,17 +29,17 @@ _WORDS = {str: "text", int: "whole number", float: "number", bool: "true or fals
 
 
 class OneOf(NamedTuple):
-    """Says in the metadata of a text which names it may be."""
+    """Metadata of a text that must be one of some names."""
 
     names: Sequence[str]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> CoreSchema:
-        """Return what pydantic holds a value against."""
+        """Return the schema by which pydantic validates a value."""
         return core_schema.literal_schema(list(self.names))
 
 
 class TomlTable(BaseModel):
-    """A table with its own entries and no others, whose values keep their types."""
+    """A table that accepts only its own entries, without converting their values."""
 
     model_config = ConfigDict(extra="forbid", strict=True, allow_inf_nan=False)
 
@@ -48,14 +48,10 @@ class TomlTable(BaseModel):
 
     @classmethod
     def check(cls, where: object, content: Mapping[str, Any]) -> None:
-        """Check that a table holds what this schema says.
-
-        Args:
-            where: it stands, for messages.
-            content: of the table.
+        """Check that a table conforms to this schema; messages begin with its place.
 
         Raises:
-            Refused: it holds something else; with all problems.
+            Refused: it does not; with all problems.
 
         """
         findings = Findings()
@@ -73,26 +69,26 @@ def entry(meaning: str, default: str = "", *, key: str | None = None) -> Any:
     """Declare an entry that may be left out.
 
     Args:
-        meaning: what it does, in Markdown.
-        default: what goes without it, in words.
-        key: in the file, where Python keeps that word for itself.
+        meaning: its description, in Markdown.
+        default: its default, in words.
+        key: its key in the file, if that is a keyword of Python.
 
     """
     return Field(None, alias=key, description=meaning, json_schema_extra={"without": default})
 
 
 def needed(meaning: str, example: str, *, key: str | None = None) -> Any:
-    """Declare an entry that must be there, with a value for messages, as TOML has it."""
+    """Declare a required entry, with an example in TOML for messages."""
     return Field(alias=key, description=meaning, json_schema_extra={"example": example})
 
 
 class Entry(NamedTuple):
-    """An entry in words.
+    """Description of an entry.
 
     Attributes:
-        type: what its value is.
-        meaning: what it does.
-        default: what goes without it.
+        type: its type, in words.
+        meaning: its description.
+        default: its default, in words.
 
     """
 
@@ -102,7 +98,7 @@ class Entry(NamedTuple):
 
 
 def entries(table: type[TomlTable]) -> dict[str, Entry]:
-    """The entries of a table by their keys, in their order."""
+    """Return the entries of a table by their keys, in the order of declaration."""
     return {
         key: Entry(
             _type_in_words(field.annotation, field.metadata),
@@ -123,7 +119,7 @@ def _extra(field: FieldInfo, name: str) -> str:
 
 
 def _type_in_words(annotation: Any, metadata: Sequence[Any] = ()) -> str:
-    """What a value of a type is, in words."""
+    """Describe a type in words."""
     for one in metadata:
         if isinstance(one, str):
             return one
@@ -150,14 +146,14 @@ def _type_in_words(annotation: Any, metadata: Sequence[Any] = ()) -> str:
 
 
 def _table_in(annotation: Any) -> type[TomlTable] | None:
-    """The schema of the tables that an entry may hold."""
+    """Return the schema of the tables in an entry, if its type allows tables."""
     if isinstance(annotation, type) and issubclass(annotation, TomlTable):
         return annotation
     return next(filter(None, map(_table_in, get_args(annotation))), None)
 
 
 class _Place(NamedTuple):
-    """The innermost table with an error, the way to it, and the entry; None: the whole table."""
+    """The innermost table with an error, its path, and the entry; None for the whole table."""
 
     table: type[TomlTable]
     path: tuple[str | int, ...]
@@ -165,7 +161,7 @@ class _Place(NamedTuple):
 
 
 def _place(table: type[TomlTable], error: ErrorDetails) -> _Place:
-    """Where an error is: pydantic's location also has members of unions, and parts of values."""
+    """Locate an error: pydantic's location also has members of unions, and parts of values."""
     path: tuple[str | int, ...] = ()
     parts = list(error["loc"])
     is_rule = error["type"] == "value_error"
@@ -180,7 +176,7 @@ def _place(table: type[TomlTable], error: ErrorDetails) -> _Place:
                 step = (key, member)
             elif member != inner.__name__:
                 inner = None
-        # A rule is broken by a whole table, anything else by an entry of the one around it.
+        # A rule applies to a whole table, every other check to an entry of the table around it.
         if inner is None or not (parts or is_rule):
             return _Place(table, path, key)
         table, path = inner, (*path, *step)
@@ -190,7 +186,7 @@ def _place(table: type[TomlTable], error: ErrorDetails) -> _Place:
 def _problems(
     table: type[TomlTable], content: Mapping[str, Any], errors: Sequence[ErrorDetails]
 ) -> Iterator[str]:
-    """What is wrong, once for each entry."""
+    """Yield the problems, one for each entry."""
     places = {_place(table, error): error for error in errors}
     missing: dict[_Place, list[str]] = {}
     for place, error in places.items():
@@ -201,7 +197,7 @@ def _problems(
             yield f"{_where(path)}{key}: write names of entries as texts"
         elif error["type"] == "missing":
             missing.setdefault(place._replace(key=None), []).append(key)
-        # If a value may be a table and is one, a flaw within it says more.
+        # If a value may be a table and is one, an error inside it is more specific.
         elif not any(other.path[: len(path) + 1] == (*path, key) for other in places):
             yield _where(path) + _problem(inner, key, _at(content, (*path, key)))
     for (inner, path, _), keys in missing.items():
@@ -210,7 +206,7 @@ def _problems(
 
 
 def _stated_twice(content: Mapping[str, Any]) -> Iterator[str]:
-    """The names that a table in it has both quoted and dotted, after the way to that table."""
+    """Yield names that a table contains both quoted and dotted, with the path of that table."""
     for key, value in content.items():
         for number, table in enumerate(value if isinstance(value, list) else [value]):
             if isinstance(table, Mapping):
@@ -223,7 +219,7 @@ def _stated_twice(content: Mapping[str, Any]) -> Iterator[str]:
 
 
 def _names(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, bool]]:
-    """All dotted names in a table, and whether they are of values."""
+    """Yield all dotted names in a table, with True for names of values."""
     for key, value in table.items():
         yield f"{before}{key}", not isinstance(value, Mapping)
         if isinstance(value, Mapping):
@@ -246,7 +242,7 @@ def _problem(table: type[TomlTable], key: str, value: Any) -> str:
 
 
 def _where(path: Sequence[str | int]) -> str:
-    """The way to a table, in words: the tables of a list are counted from one."""
+    """Return the path of a table in words; the tables of a list are counted from one."""
     words: list[str] = []
     for part in path:
         if isinstance(part, int):

@@ -1,4 +1,4 @@
-"""Numbers, truth values and texts as files write them, patterns of names, tables."""
+"""Numbers, truth values and texts in files, patterns of names, and nested tables."""
 
 from __future__ import annotations
 
@@ -16,24 +16,20 @@ BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
 
 
 def real(text: str) -> float:
-    """A number as every program reads it: only Python takes 1_000, and digits of any script."""
+    """Read a number as all programs do: only Python accepts 1_000, and digits of any script."""
     return float(_plain(text))
 
 
 def integer(text: str) -> int:
-    """A whole number as every program reads it."""
+    """Read a whole number as all programs do."""
     return int(_plain(text))
 
 
 def finite(text: str, where: str) -> float:
-    """A number that can be computed with, from a file.
-
-    Args:
-        text: of the number.
-        where: it stands, for the message.
+    """Read a finite number from a file; `where` is its place for the message.
 
     Raises:
-        ValueError: it is not one.
+        ValueError: it is not a finite number.
 
     """
     try:
@@ -46,14 +42,10 @@ def finite(text: str, where: str) -> float:
 
 
 def whole(text: str, where: str) -> int:
-    """An integer from a file, which other tools may have written with a point.
-
-    Args:
-        text: of the number.
-        where: it stands, for the message.
+    """Read an integer from a file, which other tools may have written with a decimal point.
 
     Raises:
-        ValueError: it is not one.
+        ValueError: it is not an integer.
 
     """
     number = finite(text, where)
@@ -65,7 +57,7 @@ def whole(text: str, where: str) -> int:
 
 
 def is_finite(value: object) -> bool:
-    """Whether it is a number that can be computed with: TOML has nan, inf, and endless integers."""
+    """Return True for a finite number: TOML has nan, inf, and integers of any length."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return abs(value) <= sys.float_info.max
@@ -78,7 +70,7 @@ def _plain(text: str) -> str:
 
 
 def transferable(text: str) -> str:
-    """A text that FMI can carry: in UTF-8, and ended by the first zero."""
+    """Return a text, if FMI can pass it: as UTF-8 that ends at the first zero."""
     text.encode()
     if "\0" in text:
         raise ValueError("a text cannot contain a zero character")
@@ -86,15 +78,15 @@ def transferable(text: str) -> str:
 
 
 def literal(value: float | bool | str) -> str:
-    """A value as XML writes it."""
+    """Write a value as in XML."""
     return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
-    """The names that match one of some patterns such as `a.b.*`, in their own order.
+    """Return the names that match at least one pattern such as `a.b.*`, in their own order.
 
     Raises:
-        InputError: a pattern matches none.
+        InputError: a pattern matches no name.
 
     """
     for pattern in patterns:
@@ -104,8 +96,8 @@ def matching(names: Sequence[str], patterns: Sequence[str]) -> list[str]:
 
 
 def matches(name: str, pattern: str) -> bool:
-    """Whether a name is the pattern, belongs to the group it names, or fits its wildcards."""
-    # Brackets belong to names of arrays; they are not sets of letters here.
+    """Return True if a name is the pattern, is in the group it names, or fits its wildcards."""
+    # Brackets are part of names of arrays, not sets of letters.
     escaped = pattern.replace("[", "[[]")
     is_member = name.startswith((f"{pattern}.", f"{pattern}["))
     return name == pattern or is_member or fnmatchcase(name, escaped)
@@ -117,9 +109,9 @@ def flatten(
     """Flatten a table to values by dotted names, whether its keys were quoted or dotted.
 
     Args:
-        table: with tables in it.
-        is_value: whether a table in it is a value itself.
-        prefix: of all names.
+        table: nested tables.
+        is_value: returns True for a table that is a value itself.
+        prefix: prefix of all names.
 
     """
     for key, value in table.items():

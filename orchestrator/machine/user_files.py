@@ -1,8 +1,8 @@
-"""Files that the user names: only regular ones, so that none blocks and none is endless.
+"""Files that the user names: only regular ones, since others may block or never end.
 
 Archives are unpacked once for each process and content, into a temporary folder of the process.
-Running a system again then neither unzips an FMU nor loads its library a second time; and what was
-read of a file stays what it was, whatever becomes of the file.
+Running a system again then neither unzips an FMU nor loads its library a second time, and a later
+change of the archive has no effect.
 """
 
 from __future__ import annotations
@@ -24,31 +24,31 @@ from zipfile import ZipFile, ZipInfo
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError, reason
 
-#: Longest file that is read as a whole, and longest line of one that is not [characters].
+#: Longest file that is read as a whole, and longest line of other files [characters].
 _LONGEST, _LONGEST_LINE = 10_000_000, 1_000_000
 
-#: Most files and bytes that an archive may hold, with those nested in it.
+#: Largest number of files and bytes in an archive, including nested archives.
 _MOST_FILES, _MOST_BYTES = 100_000, 2**30
 
-#: Longest archive that is unpacked, whatever it says that it holds [bytes].
+#: Longest archive that is unpacked, whatever sizes it declares [bytes].
 _LONGEST_ARCHIVE = 2 * _MOST_BYTES
 
-#: Most nested folders in an archive: Python enters them recursively.
+#: Deepest nesting of folders in an archive: Python walks them recursively.
 _MOST_FOLDERS = 100
 
-#: Most that is unpacked in a process [bytes].
+#: Largest total size of the unpacked archives of a process [bytes].
 _MOST_OF_A_PROCESS = 2**33
 
-#: Files of an archive that are read into memory, and how long they may be [bytes].
+#: Suffixes of files in an archive that are read into memory, and their largest size [bytes].
 _DESCRIPTIONS, _MOST_OF_A_DESCRIPTION = (".xml", ".ssd", ".ssv", ".ssm"), 100_000_000
 
 #: First bytes of a Git LFS pointer.
 _POINTER = b"version https://git-lfs.github.com/spec/"
 
-#: Threads share what is unpacked.
+#: Guards the dictionaries below, which threads share.
 _LOCK = Lock()
 
-#: A file as it is now; when it is written, it gets another one.
+#: Identifies the present content of a file; changes when the file is written.
 _Version: TypeAlias = tuple[int, ...]
 
 
@@ -61,17 +61,17 @@ class _Size(NamedTuple):
     its_folder: Path
 
 
-#: By the folders of unpacked archives.
+#: Sizes by the folders of unpacked archives.
 _sizes: dict[Path, _Size] = {}
 
-#: Digests by the files that had them, and folders by the digests of the archives in them.
+#: Digests by versions of files, and folders by the digests of the archives in them.
 _digests: dict[_Version, str] = {}
 _folders: dict[str, Path] = {}
 
 
 @contextmanager
 def explain_errors(path: Path, what: str) -> Iterator[None]:
-    """Name the file in errors of reading it; `what` it is then, for example `not a table`."""
+    """Turn errors of reading a file into messages that name it and `what` it is: `not a table`."""
     try:
         yield
     except InputError:
@@ -85,14 +85,14 @@ def explain_errors(path: Path, what: str) -> Iterator[None]:
 
 
 def is_folder(path: Path) -> bool:
-    """Tell whether there is such a folder; False also for an impossible name."""
+    """Return True if a folder exists; False also for an invalid name."""
     with suppress(OSError, ValueError):
         return path.is_dir()
     return False
 
 
 def check_file(path: Path) -> None:
-    """Check that there is a file that can be read to its end.
+    """Check that a file exists and is a regular one.
 
     Raises:
         InputError: there is none, or it is a folder, a pipe or a device.
@@ -109,14 +109,10 @@ def check_file(path: Path) -> None:
 
 
 def read_text(path: Path, what: str) -> str:
-    """Read a short file as text.
-
-    Args:
-        path: of the file.
-        what: it is if it cannot be read as text, for the message.
+    """Read a short file as text; `what` describes a file that is not text, for the message.
 
     Raises:
-        InputError: there is no such file, it is too long, or no text in UTF-8.
+        InputError: there is no such file, it is too long, or it is not UTF-8.
 
     """
     check_file(path)
@@ -129,11 +125,11 @@ def read_text(path: Path, what: str) -> str:
 
 @contextmanager
 def open_lines(path: Path, newline: str | None = None) -> Iterator[Iterator[str]]:
-    """Open a text in UTF-8, to take its lines one by one; `newline` as for `open`.
+    """Open a text in UTF-8 and yield its lines one by one; `newline` as for `open`.
 
     Raises:
         InputError: there is no such file.
-        ValueError: while lines are taken, if it is not text, or a line has no end.
+        ValueError: while lines are read, if it is not text, or a line is too long.
 
     """
     check_file(path)
@@ -149,14 +145,14 @@ def _bounded(file: TextIO) -> Iterator[str]:
 
 
 class Unpacked(NamedTuple):
-    """The folder that an archive was unpacked into, and the SHA-256 of the archive."""
+    """The folder of an unpacked archive, and the SHA-256 of the archive."""
 
     folder: Path
     digest: str
 
 
 def unpack(archive: Path) -> Unpacked:
-    """Unpack an FMU or SSP as it is now.
+    """Unpack an FMU or SSP in its present state.
 
     Raises:
         InputError: it cannot be unpacked.
@@ -178,10 +174,10 @@ def unpack(archive: Path) -> Unpacked:
 
 
 def unpacked_folder(archive: Path, digest: str) -> Path:
-    """Return the folder of an archive as it was read, in this process or in another one.
+    """Return the folder of an archive with a digest, which may have been read in another process.
 
     Raises:
-        InputError: this process has not read it, and the file has changed.
+        InputError: this process has not unpacked it, and the file has changed.
 
     """
     if digest not in _folders:
@@ -211,7 +207,7 @@ def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
     version = _version_of(file)
     if version not in _digests:
         with ZipFile(file) as content:
-            # Before the file is read to its end, which it may not have.
+            # Before the file is read completely, since it may be endless.
             _check_entries(content)
             if (size := os.fstat(file.fileno()).st_size) > _LONGEST_ARCHIVE:
                 raise ValueError(f"it is {size:,} bytes long, more than {_LONGEST_ARCHIVE:,}")
@@ -228,14 +224,14 @@ def _unpacked(archive: Path, file: BufferedReader) -> Unpacked:
 
 
 def _version_of(file: BufferedReader) -> _Version:
-    # A file that is written gets another time of change, whatever is done to the others.
+    # Writing always changes ctime, while mtime can be set to anything.
     status = os.fstat(file.fileno())
     times = status.st_mtime_ns, status.st_ctime_ns
     return status.st_dev, status.st_ino, status.st_size, *times
 
 
 def _extracted(archive: Path, content: ZipFile) -> Path:
-    """Extract an archive into a new folder, unless it fills the disk with what there is."""
+    """Extract an archive into a new folder, unless the total size of archives exceeds a limit."""
     entries = content.infolist()
     files, size = len(entries), sum(entry.file_size for entry in entries)
     around = next((_sizes[folder] for folder in archive.parents if folder in _sizes), None)
@@ -272,7 +268,7 @@ def _extracted(archive: Path, content: ZipFile) -> Path:
 
 
 def _check_entries(content: ZipFile) -> None:
-    """Refuse what fills the disk or the memory, and what tools unpack in different ways."""
+    """Refuse archives that fill the disk or memory, or that tools unpack in different ways."""
     entries = content.infolist()
     if len(entries) > _MOST_FILES:
         raise ValueError(f"it holds {len(entries):,} files, more than {_MOST_FILES:,}")
@@ -294,7 +290,7 @@ def _check_entries(content: ZipFile) -> None:
 
 
 def _are_same(content: ZipFile, first: ZipInfo, second: ZipInfo) -> bool:
-    """Tell whether two entries unpack to the same: some tools list one twice."""
+    """Return True if two entries have the same content: some tools list one twice."""
     if first is second:
         return True
     keys = ("filename", "file_size", "CRC")

@@ -1,4 +1,4 @@
-"""Processes that work in parallel, and end at once when the user wants to stop."""
+"""Parallel worker processes, which end at once when the user stops the program."""
 
 from __future__ import annotations
 
@@ -29,42 +29,42 @@ from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.operating_system import most_processes, without_interrupt
 
-#: Interval at which the loop asks whether it is to stop [s].
+#: Polling interval for signals to stop [s].
 _PATIENCE = 0.1
 
-#: How often a process is asked to leave before it is killed.
+#: Number of SIGTERMs that a process gets before it is killed.
 _REMINDERS = 8
 
 _Key = TypeVar("_Key", bound=Hashable)
 
 
 class Workers:
-    """A pool of up to `n` processes, as :func:`workers` gives them, or threads."""
+    """A pool of up to `n` processes from :func:`workers`, or of threads."""
 
     def __init__(self, n: int, fresh: Callable[[], Executor], interrupts: Interrupts) -> None:
-        """Make a pool by `fresh`; it starts no process yet."""
+        """Make a pool with `fresh`; no process is started yet."""
         self.n = n
         self._fresh, self._interrupts = fresh, interrupts
         self._others = set(active_children())
         self._pool = fresh()
 
     def renew(self) -> None:
-        """Replace all processes, as one of them has died."""
+        """Replace all processes after one of them has died."""
         self.close(at_once=True)
         self._pool = self._fresh()
 
     def submit(self, task: Callable[..., Any], *arguments: Any) -> Future[Any]:
-        """Give a task to a process.
+        """Pass a task to a process.
 
         Raises:
-            InputError: none can be started.
+            InputError: no process can be started.
 
         """
         try:
             with without_interrupt():
                 return self._pool.submit(task, *arguments)
         except BrokenProcessPool as error:
-            # An idle one has died: this is reported where the task is waited for.
+            # An idle process has died: report it where the result is waited for.
             future: Future[Any] = Future()
             future.set_exception(error)
             return future
@@ -72,7 +72,7 @@ class Workers:
             raise InputError(f"no process can be started: {reason(error)}") from error
 
     def done(self, futures: Iterable[Future[Any]]) -> set[Future[Any]]:
-        """Wait until some of the tasks are done, and return these.
+        """Wait until at least one task is done, and return the finished ones.
 
         Raises:
             KeyboardInterrupt: there was a signal to stop.
@@ -88,10 +88,10 @@ class Workers:
     def results(
         self, tasks: Mapping[_Key, Callable[[], Any]], unit: str
     ) -> Iterator[tuple[_Key, Any]]:
-        """Yield keys and results of tasks as they are done; tasks begin in their order.
+        """Yield keys and results of tasks as they finish; tasks begin in their order.
 
         Raises:
-            InputError: a process has died, or none could be started.
+            InputError: a process has died, or could not be started.
             KeyboardInterrupt: there was a signal to stop.
 
         """
@@ -99,7 +99,7 @@ class Workers:
         keys: dict[Future[Any], _Key] = {}
         with tqdm(total=len(tasks), unit=unit, disable=None) as bar:
             while True:
-                # No more than can begin: a process returns no task unfinished.
+                # Submit only as many as can begin: a submitted task cannot be withdrawn.
                 for key, task in islice(left, self.n - len(keys)):
                     keys[self.submit(task)] = key
                 if not keys:
@@ -109,7 +109,7 @@ class Workers:
                     yield keys.pop(future), _result(future, unit)
 
     def close(self, at_once: bool = False) -> None:
-        """End all processes, at once or when they are done with their tasks."""
+        """End all processes, at once or when their tasks are done."""
         if at_once:
             _end(set(active_children()) - self._others)
         self._pool.shutdown(cancel_futures=True)
@@ -128,25 +128,25 @@ def _result(future: Future[Any], unit: str) -> Any:
 def workers(n: int | None = None, setup: Callable[[], object] = bool) -> Iterator[Workers]:
     """Provide processes for the context; an exception ends them at once.
 
-    They are fresh ones, not copies of this, since FMUs are libraries that a process loads.
+    They are spawned, not forked, since a fork would inherit the libraries of loaded FMUs.
 
     Args:
-        n: how many; None: one for each core.
-        setup: called first in each of them.
+        n: number of processes; None: one for each core.
+        setup: called first in each process.
 
     """
-    # Their temporary files are removed with those of this process, however they end.
+    # Their temporary files are in this process's folder, so they are always removed.
     environment = {"TMPDIR": str(process_folder())} | cache.environment()
     begin, n = partial(_begin, environment, setup), min(n or cores(), most_processes())
     with held_interrupts() as interrupts:
         pool = partial(ProcessPoolExecutor, n, get_context("spawn"), begin)
-        crew = Workers(n, pool, interrupts)
+        processes = Workers(n, pool, interrupts)
         try:
-            yield crew
+            yield processes
         except BaseException:
-            crew.close(at_once=True)
+            processes.close(at_once=True)
             raise
-        crew.close()
+        processes.close()
 
 
 def cores() -> int:
@@ -172,12 +172,12 @@ def _end(processes: Collection[BaseProcess]) -> None:
 
 
 def _begin(environment: Mapping[str, str], setup: Callable[[], object]) -> None:
-    """Set up a new process, which leaves by SIGTERM without temporary folders."""
+    """Set up a new process, which on SIGTERM removes its temporary folders and exits."""
     os.environ.update(environment)
     tempfile.tempdir = environment["TMPDIR"]
     signal.signal(signal.SIGTERM, _leave)
     if hasattr(signal, "SIGHUP"):
-        # Only the process that has started this one answers the end of the terminal.
+        # Only the parent process handles the end of the terminal.
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     threading.Thread(target=_follow, daemon=True).start()
     # As in the main process.
@@ -187,7 +187,7 @@ def _begin(environment: Mapping[str, str], setup: Callable[[], object]) -> None:
 
 
 def _follow() -> None:
-    """Leave when the process that has started this one ends, even if it is killed."""
+    """Exit when the parent process ends, even if that is killed."""
     parent = parent_process()
     assert parent is not None
     parent.join()
@@ -200,6 +200,6 @@ def _follow() -> None:
 
 
 def _leave(*_: Any) -> None:
-    # Not by an exception, which the pool would take for the result of a task.
+    # Without an exception, which the pool would take for the result of a task.
     rmtree(process_folder(), ignore_errors=True)
     os._exit(1)

@@ -27,20 +27,19 @@ from fmus.discovery import write_archive
 from fmus.documentation import html_of, page_of
 from fmus.language.types import FLOAT, INT, Scalar, Type, count
 from fmus.native.emit import closed, number_in_c, quoted
-from fmus.native.numbers import has_only_doubles, moves
 from fmus.native.packaging import Parts, entries_of
-from fmus.native.pieces import array, function, structure
+from fmus.native.pieces import array, function, has_only_doubles, moves, structure
 from fmus.native.tables import places_of, port_tables
 from fmus.native.translator import constants, defined
 from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, check_enumerations
-from fmus.ports.description_fmi3 import terminals_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
+from fmus.ports.terminals import terminals_of
 from orchestrator.cosim import Plan, PortName
 from orchestrator.machine.compilers import compiler_for
+from orchestrator.machine.compilers import platforms as platforms_of
+from orchestrator.machine.disk import file_name
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.file_names import file_name
-from orchestrator.machine.platforms import platforms as platforms_of
 from orchestrator.program.writer import Text, Unsupported
 
 _NOISE = """\

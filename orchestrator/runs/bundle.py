@@ -21,10 +21,9 @@ from fmus.kinds import AUTO, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.cosim import write_ssp
 from orchestrator.machine.cache import made_once, read_cached, users_folder
 from orchestrator.machine.children import run_module
-from orchestrator.machine.compilers import compiler_for
+from orchestrator.machine.compilers import compiler_for, platforms
 from orchestrator.machine.disk import sha256_of, temporary_folder
 from orchestrator.machine.errors import InputError, last_line, reason
-from orchestrator.machine.platforms import platforms
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cosim import Ending, Header
-from orchestrator.machine.progress import progress_bar
+from orchestrator.machine.lazy import progress_bar
 
 #: Shortest run for which a bar appears [s].
 _DELAY = 2.0

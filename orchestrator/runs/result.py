@@ -42,8 +42,13 @@ from orchestrator.runs.folder import RECORD, is_changed, locate, replace_files
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import read_columns, read_rows
-from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
-from orchestrator.vehicle.indices import metrics, metrics_of, of_vehicles
+from orchestrator.vehicle.indices import (
+    SMALLEST_DISTANCE,
+    SMALLEST_DISTANCE_LABEL,
+    metrics,
+    metrics_of,
+    of_vehicles,
+)
 from orchestrator.vehicle.signals import STANDARD, Loop, loop_of
 
 if TYPE_CHECKING:

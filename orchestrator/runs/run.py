@@ -28,9 +28,8 @@ from orchestrator.cosim import (
 from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
-from orchestrator.machine.disk import process_folder
+from orchestrator.machine.disk import file_name, process_folder
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.machine.file_names import file_name
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.texts import matches, matching
 from orchestrator.runs.folder import (

@@ -44,8 +44,8 @@ from orchestrator.cosim import (
     Value,
     Variable,
 )
+from orchestrator.machine.disk import file_name
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.machine.file_names import file_name
 from orchestrator.machine.texts import finite, flatten, literal
 from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.runs import SCENARIOS_FOLDER, find_toml, names_in

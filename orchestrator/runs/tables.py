@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.machine.parquet import ROWS_AT_ONCE, parquet
+from orchestrator.machine.lazy import ROWS_AT_ONCE, parquet
 from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors, open_lines
 

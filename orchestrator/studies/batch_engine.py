@@ -39,8 +39,7 @@ from orchestrator.vehicle.cautions import (
     cautions_seen,
     values_of,
 )
-from orchestrator.vehicle.distances import SMALLEST_DISTANCE, smallest_of
-from orchestrator.vehicle.indices import INDICES, prefixed
+from orchestrator.vehicle.indices import INDICES, SMALLEST_DISTANCE, prefixed, smallest_of
 from orchestrator.vehicle.signals import loops_of
 
 #: What makes every system.

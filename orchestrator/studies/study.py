@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, get_args
 
 from orchestrator.cosim import Order
+from orchestrator.machine.disk import file_name
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.file_names import file_name
 from orchestrator.machine.user_files import read_text
 from orchestrator.runs import names_in
 

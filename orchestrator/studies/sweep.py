@@ -20,7 +20,7 @@ from orchestrator.figures.study_values import FigureEntry
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import PACKAGES
-from orchestrator.machine.progress import progress_bar
+from orchestrator.machine.lazy import progress_bar
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared

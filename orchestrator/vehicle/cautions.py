@@ -1,11 +1,11 @@
-"""What may give numbers that are not meant: known before a run, or seen in it.
+"""Warnings about numbers that are valid but misleading, known before a run or from its rows.
 
-Among the former: which velocities reach a controller that is to do without.
+Among the former: velocities that reach a controller which is meant to work without them.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from math import inf
 from typing import NamedTuple
@@ -18,7 +18,7 @@ from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
 from fmus.ports.reducer import read_reducer
 from orchestrator.cosim import Ending, Header, PortName, System, Table, Value
 from orchestrator.vehicle.index import largest_bound, vertical_passed
-from orchestrator.vehicle.reduction import Reduction, reductions_of
+from orchestrator.vehicle.reduction import reductions_of
 from orchestrator.vehicle.signals import (
     STANDARD,
     AllocatedLoop,
@@ -27,20 +27,19 @@ from orchestrator.vehicle.signals import (
     value_of,
 )
 
-#: References that are farther apart are not the same [m].
+#: Largest distance of references that count as the same [m].
 _SAME = 1e-6
 
-#: h p beyond which a mode of Euler's scheme changes its sign in every step, and grows.
+#: Values of h p above which a mode of Euler's scheme changes its sign in every step, and grows.
 _REVERSES, _GROWS = 1.0, 2.0
 
-#: Gives the value of a parameter by its name `component.name`; None: there is none.
+#: Returns the value of a parameter by its name `component.name`; None if there is none.
 ValueOf = Callable[[str], Value | None]
 
 #: Units of a velocity at a port.
 _VELOCITY_UNITS = {"m/s", "rad/s"}
 
-
-#: What there is to be wary of, as the table of a study names it, and what it means there.
+#: Kinds of warnings in the table of a study, and their explanations there.
 UNSTABLE, CHATTERING, VERTICAL = "unstable observer", "chattering", "vertical passed"
 CAUTIONS = {
     UNSTABLE: "k_d is too large for the internal steps of the controller; lower k_d or h_max",
@@ -51,7 +50,7 @@ CAUTIONS = {
 
 
 class Caution(NamedTuple):
-    """What to be wary of in a run.
+    """A warning about a run.
 
     Attributes:
         kind: one of :data:`CAUTIONS`.
@@ -64,7 +63,7 @@ class Caution(NamedTuple):
 
 
 def values_of(system: System) -> ValueOf:
-    """The values of the parameters of a system."""
+    """Return a function that returns the values of the parameters of a system."""
 
     def value(name: str) -> Value | None:
         port = PortName.read(name)
@@ -74,13 +73,13 @@ def values_of(system: System) -> ValueOf:
 
 
 def gain_of_a_step(value: ValueOf, h: float, controller: str = STANDARD.controller) -> float:
-    """k_d as a step of h seconds takes it [1/s]: the form of the observer may change it."""
+    """Return k_d as used in a step of h seconds [1/s]: the form of the observer may change it."""
     k_d = float(value(f"{controller}.k_d") or 0.0)
     return exact_gain(k_d, h) if value(f"{controller}.observer") in ("exact", Form.EXACT) else k_d
 
 
 def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution]:
-    """What can be said before a run in steps of a length [s]."""
+    """Return the warnings before a run with steps of a length [s]."""
     found = []
     for controller in dict.fromkeys(loop.controller for loop in loops):
         values = [value(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
@@ -100,10 +99,10 @@ def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution
 
 
 def differing_vehicle(system: System) -> str | None:
-    """Where a controller or planner holds other values of the vehicle than the plant, in words.
+    """Report values of the vehicle in a controller or planner that differ from the plant's.
 
     Returns:
-        One line; None: nowhere.
+        One line; None if there are none.
 
     """
     found = (_differing(system, loop) for loop in loops_of(system))
@@ -130,7 +129,7 @@ def _differing(system: System, loop: Loop) -> str | None:
 
 
 def _real_parameter(system: System, name: PortName) -> float | None:
-    """The value of a parameter that is a number; None: there is none of the name."""
+    """Return the value of a Real parameter; None if there is none of the name."""
     if not system.has(name):
         return None
     variable = system.component(name.component).variables[name.port]
@@ -139,59 +138,55 @@ def _real_parameter(system: System, name: PortName) -> float | None:
     return None if value is None else float(value)
 
 
-#: What cautions follow from.
+#: Reducers from whose results warnings follow.
 WATCHED = (read_reducer(largest_bound), read_reducer(vertical_passed))
 
 
 class Watch:
-    """An observer that keeps what cautions follow from."""
+    """An observer that collects warnings from the rows of a run."""
 
     def __init__(self, loops: Sequence[Loop] = (STANDARD,)) -> None:
         """Watch some loops."""
         self._loops = loops
 
     def begin(self, header: Header) -> None:
-        """Find out what can be seen."""
+        """Select the reducers that the run allows."""
         self._header = header
         self._reductions = reductions_of(WATCHED, self._loops, header)
 
     def take(self, rows: np.ndarray) -> None:
-        """Look at some rows."""
+        """Process rows."""
         for reductions in self._reductions.values():
             for reduction in reductions.values():
                 reduction.take(rows)
 
     def end(self, ending: Ending) -> None:
-        """Nothing more is seen."""
+        """Do nothing: all rows have come."""
 
     def found(self) -> list[Caution]:
-        """What the rows have shown."""
+        """Return the warnings that follow from the rows."""
         table = Table.of(self._header, np.empty((0, 1 + len(self._header.columns))))
         step = self._header.experiment.step
         return [
             caution
             for loop, reductions in self._reductions.items()
-            for seen in [_seen(reductions.values())]
-            for caution in cautions_seen(seen, loop, partial(value_of, table), step)
+            for caution in cautions_seen(
+                {
+                    name: value
+                    for one in reductions.values()
+                    for name, [value] in one.found().items()
+                },
+                loop,
+                partial(value_of, table),
+                step,
+            )
         ]
-
-
-def _seen(reductions: Iterable[Reduction]) -> dict[str, float]:
-    return {name: value for one in reductions for name, [value] in one.found().items()}
 
 
 def cautions_seen(
     seen: Mapping[str, float], loop: Loop, value: ValueOf, step: float
 ) -> Iterator[Caution]:
-    """What a run has shown of a loop.
-
-    Args:
-        seen: the numbers of :data:`WATCHED` by their names, as far as there are some.
-        loop: that they are of.
-        value: gives the values of parameters.
-        step: of the run [s].
-
-    """
+    """Yield the warnings that follow from the results of :data:`WATCHED` for a loop."""
     rho_hat, vertical = seen.get("largest_bound", -inf), seen.get("vertical_passed", inf)
     roll, eps = f"{loop.vehicle}.roll", f"{loop.controller}.eps_t"
     needed = (eps, loop.ell, f"{loop.controller}.h_max", *loop.vehicle_parameters)
@@ -220,19 +215,11 @@ def cautions_seen(
 def cautions_beside(
     table: Table, name: str, other: Table, loops: Sequence[Loop] = (STANDARD,)
 ) -> list[str]:
-    """Lines for the user about references that differ from those of the compared run.
-
-    Args:
-        table: of the run.
-        name: of the one that it is compared with.
-        other: of that one.
-        loops: that both have.
-
-    """
-    return [line for loop in loops for line in _of_the_reference(table, name, other, loop)]
+    """Return lines for the user if references differ between a run and another one of some name."""
+    return [line for loop in loops for line in _differing_reference(table, name, other, loop)]
 
 
-def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list[str]:
+def _differing_reference(table: Table, name: str, other: Table, loop: Loop) -> list[str]:
     if table.missing(loop.y_d) or other.missing(loop.y_d):
         return []
     _, here, there = np.intersect1d(table.time, other.time, return_indices=True)
@@ -247,10 +234,10 @@ def _of_the_reference(table: Table, name: str, other: Table, loop: Loop) -> list
 
 
 def velocities_reaching(system: System, loop: Loop = STANDARD) -> list[str]:
-    """Velocities of the vehicle that reach its controller, directly or through others.
+    """Return the velocities of the vehicle that reach its controller, directly or through others.
 
-    The vehicle is what the controller feeds, itself or through an allocation. Empty for a
-    controller without velocity sensors.
+    The vehicle is the component that the controller feeds, directly or through an allocation. The
+    list is empty for a controller without velocity sensors.
     """
     vehicles = {connection.target.component for connection in system.fed.get(loop.controller, ())}
     if isinstance(loop, AllocatedLoop):

@@ -1,12 +1,15 @@
 """Indices of a run, (59) and others: each is declared once, in :data:`INDICES`.
 
-The table serves metrics.json, the terminal, the report, the columns of a study and the labels of
-its figures. What an index is, its module in :mod:`.index` says.
+The table is used for metrics.json, the terminal, the report, the columns of a study and the labels
+of its figures. Each index is defined in a module of :mod:`.index`. The smallest distance between
+vehicles is the one index of several vehicles together; it is computed here, because numpy compares
+all pairs of hundreds of vehicles far faster than equations in Python do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import combinations
 from math import inf
 from types import ModuleType
 from typing import Any, NamedTuple
@@ -18,11 +21,6 @@ from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer, read_reducer
 from orchestrator.cosim import Ending, Header, PortName, System, Table
 from orchestrator.vehicle.cautions import velocities_reaching
-from orchestrator.vehicle.distances import (
-    SMALLEST_DISTANCE,
-    for_distances,
-    smallest_distances,
-)
 from orchestrator.vehicle.index import (
     effort,
     estimate_error,
@@ -35,21 +33,28 @@ from orchestrator.vehicle.index import (
     tracking,
 )
 from orchestrator.vehicle.reduction import reductions_of
-from orchestrator.vehicle.signals import STANDARD, Loop
+from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 
-#: Where metrics.json has the indices of each of several vehicles.
+#: The index of several vehicles: its name in files, and its label.
+SMALLEST_DISTANCE = "smallest_distance"
+SMALLEST_DISTANCE_LABEL = "smallest distance between vehicles"
+
+#: Number of coordinates that are compared at once.
+_AT_ONCE = 1_000_000
+
+#: Key in metrics.json of the indices of each of several vehicles.
 VEHICLES = "vehicles"
 
 
 class Index(NamedTuple):
-    """An index: what it is called, and what makes it.
+    """An index: its names, and the reducer that computes it.
 
     Attributes:
-        name: in files; `name.member` in the columns of a study.
-        label: in figures and tables.
-        reducer: that has it among its results.
-        symbol: in formulas, with its members as indices, before the label.
-        is_metric: whether metrics.json holds it, or a study only.
+        name: name in files; `name.member` in the columns of a study.
+        label: name in figures and tables.
+        reducer: the reducer that has it among its results.
+        symbol: symbol in formulas, before the label; members become its indices.
+        is_metric: True if metrics.json contains it, False if only studies do.
 
     """
 
@@ -65,7 +70,7 @@ class Index(NamedTuple):
 
     @property
     def meaning(self) -> str:
-        """What the reference page says."""
+        """Description for the reference page."""
         return self.reducer.meanings[self.name]
 
     @property
@@ -77,22 +82,22 @@ class Index(NamedTuple):
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """The names of its numbers in the table of a study."""
+        """Names of its columns in the table of a study."""
         return tuple(port.name for port in self._ports)
 
     @property
     def members(self) -> str:
-        """Its members, with commas between them; empty: it is a single number."""
+        """Names of its members, separated by commas; empty for a single number."""
         return ", ".join(self.units)
 
     @property
     def unit(self) -> str:
-        """The units of its members, each once, with commas between them."""
+        """Units of its members, each once, separated by commas."""
         return ", ".join(filter(None, dict.fromkeys(self.units.values())))
 
 
 def _read(*modules: ModuleType) -> dict[str, Reducer]:
-    """The reducers of some modules, by the names of their indices."""
+    """Return the reducers of modules, by the names of their indices."""
     reducers = map(read_reducer, modules)
     return {name: reducer for reducer in reducers for name in reducer.results}
 
@@ -115,8 +120,8 @@ def _index(name: str, label: str, symbol: str = "", is_metric: bool = False) -> 
 
 
 #: All indices, in the order of the columns of a study; e is y - y_d with the true control point,
-#: efforts are of the applied signal. What a system has no ports for, and what is never reached, is
-#: not there.
+#: efforts are of the applied signal. A run lacks an index if its system has no ports for it, or if
+#: its value is never reached.
 INDICES: tuple[Index, ...] = (
     _index("l2_effort", "L2 effort", is_metric=True),
     _index("rms_effort", "RMS effort", is_metric=True),
@@ -135,19 +140,16 @@ INDICES: tuple[Index, ...] = (
 
 
 def metrics() -> tuple[Index, ...]:
-    """The indices that metrics.json holds."""
+    """Return the indices in metrics.json."""
     return tuple(index for index in INDICES if index.is_metric)
 
 
 def index_columns(
     loops: Sequence[Loop] = (STANDARD,), own: Sequence[Index] = ()
 ) -> tuple[str, ...]:
-    """The columns of all indices in a study; of several loops, after the names of the vehicles.
+    """Return the columns of all indices in a study, the user's own last.
 
-    Args:
-        loops: of the vehicles.
-        own: the user's, after the others.
-
+    With several vehicles, they begin with the vehicle's name.
     """
     of_each = (
         f"{prefix}{column}"
@@ -159,7 +161,7 @@ def index_columns(
 
 
 def index_units(index: Index, loops: Sequence[Loop] = (STANDARD,)) -> dict[str, str]:
-    """Units of the columns of an index, and of all of it if they have one."""
+    """Return the units of the columns of an index, and of its name if all have the same unit."""
     units = dict(zip(index.columns, index.units.values(), strict=True))
     if len({*units.values()}) == 1:
         units[index.name] = index.unit
@@ -169,13 +171,63 @@ def index_units(index: Index, loops: Sequence[Loop] = (STANDARD,)) -> dict[str, 
 
 
 def prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
-    """Loops with what the names of their columns begin with: of several, the vehicle."""
+    """Yield loops with the prefixes of their columns: with several, the vehicle's name."""
     for loop in loops:
         yield loop, f"{loop.name}." if len(loops) > 1 else ""
 
 
+# Distances between vehicles
+
+
+def size(vectors: np.ndarray) -> np.ndarray:
+    """Return the Euclidean norm of each row, summed in the order of its members."""
+    squares = np.zeros(len(vectors))
+    for column in vectors.T:
+        squares = squares + column * column
+    norm: np.ndarray = np.sqrt(squares)
+    return norm
+
+
+def for_distances(loops: Sequence[Loop]) -> Needs:
+    """Return what distances between vehicles are computed from."""
+    return [column for loop in loops for column in loop.position], ()
+
+
+def distances(table: Table, loops: Sequence[Loop]) -> dict[tuple[str, str], np.ndarray]:
+    """Return the distance of the centres of mass of each two vehicles, by name, per row [m]."""
+    return {
+        (one.name, other.name): size(table.group(*one.position) - table.group(*other.position))
+        for one, other in combinations(loops, 2)
+    }
+
+
+def smallest_distances(table: Table, loops: Sequence[Loop]) -> np.ndarray:
+    """Return the distance between the two closest vehicles, per row [m]."""
+    return smallest_of(np.stack([table.group(*loop.position) for loop in loops], axis=1))
+
+
+def smallest_of(positions: np.ndarray) -> np.ndarray:
+    """Return the smallest distance of each row [m], for positions (rows, vehicles, 3) [m]."""
+    rows = max(1, _AT_ONCE // positions.shape[1])
+    blocks = np.split(positions, range(rows, len(positions), rows))
+    return np.concatenate([_smallest(block) for block in blocks])
+
+
+def _smallest(positions: np.ndarray) -> np.ndarray:
+    """Return the smallest distance of each row, without blocks."""
+    squares = np.full(len(positions), np.inf)
+    for i in range(1, positions.shape[1]):
+        apart = positions[:, i:] - positions[:, :-i]
+        squares = np.minimum(squares, (apart**2).sum(axis=2).min(axis=1, initial=np.inf))
+    smallest: np.ndarray = np.sqrt(squares)
+    return smallest
+
+
+# Observers
+
+
 class Indices:
-    """An observer that computes the indices that a run has columns and parameters for."""
+    """An observer that computes the indices for which a run has columns and parameters."""
 
     def __init__(
         self,
@@ -183,18 +235,11 @@ class Indices:
         chosen: Sequence[Index] | None = None,
         own: Sequence[Index] = (),
     ) -> None:
-        """Take what is measured.
-
-        Args:
-            loops: of the vehicles.
-            chosen: out of :data:`INDICES`; None: all.
-            own: indices of the user's own.
-
-        """
+        """Choose among :data:`INDICES`, by default all, and add the user's own."""
         self._loops, self._chosen = loops, (*(INDICES if chosen is None else chosen), *own)
 
     def begin(self, header: Header) -> None:
-        """Find out which indices there will be."""
+        """Select the indices that the run allows."""
         self._header, self._end = header, header.experiment.start_time
         self._failure: str | None = None
         self._reductions = reductions_of(
@@ -202,11 +247,11 @@ class Indices:
         )
         none = Table.of(header, np.empty((0, 1 + len(header.columns))))
         has_distances = len(self._loops) > 1 and not none.missing(*for_distances(self._loops))
-        #: What there is of several vehicles together.
+        #: Indices of several vehicles together.
         self.together = {SMALLEST_DISTANCE: inf} if has_distances else {}
 
     def take(self, rows: np.ndarray) -> None:
-        """Take some rows into account."""
+        """Process rows."""
         for reductions in self._reductions.values():
             for reduction in reductions.values():
                 reduction.take(rows)
@@ -216,26 +261,26 @@ class Indices:
         self._end = float(rows[-1, 0])
 
     def end(self, ending: Ending) -> None:
-        """Remember how the run has ended."""
+        """Keep the failure of the run, if any."""
         self._failure = ending.failure
 
     def found(self, loop: Loop = STANDARD) -> dict[str, list[float]]:
-        """The members of the indices of a loop, by their names."""
-        of = {reducer: one.found() for reducer, one in self._reductions[loop].items()}
+        """Return the members of the indices of a loop, by the names of the indices."""
+        results = {reducer: one.found() for reducer, one in self._reductions[loop].items()}
         return {
-            index.name: of[index.reducer][index.name]
+            index.name: results[index.reducer][index.name]
             for index in self._chosen
-            if index.name in of.get(index.reducer, ())
+            if index.name in results.get(index.reducer, ())
         }
 
     @property
     def failures(self) -> list[str]:
-        """What indices have raised."""
+        """Messages of the indices that have raised an exception."""
         every = (one for reductions in self._reductions.values() for one in reductions.values())
         return [one.failure for one in every if one.failure]
 
     def values(self) -> dict[str, float]:
-        """The numbers of all loops, by their columns in a study."""
+        """Return the numbers of all loops, by their columns in a study."""
         return self.together | {
             f"{prefix}{column}": value
             for loop, prefix in prefixed(self._loops)
@@ -247,20 +292,14 @@ class Indices:
 
 
 class Metrics(Indices):
-    """An observer that computes what metrics.json holds."""
+    """An observer that computes the content of metrics.json."""
 
     def __init__(self, loops: Sequence[Loop] = (STANDARD,)) -> None:
         """Take the loops of the vehicles."""
         super().__init__(loops, metrics())
 
     def content(self, scenario: str, system: System) -> dict[str, Any]:
-        """What metrics.json holds: of several vehicles, the indices of each under its name.
-
-        Args:
-            scenario: its name.
-            system: that was run.
-
-        """
+        """Return the content of metrics.json; indices of several vehicles are under their names."""
         experiment = self._header.experiment
         content: dict[str, Any] = {
             "scenario": scenario,
@@ -271,12 +310,12 @@ class Metrics(Indices):
         }
         if self._failure is not None:
             content["failure"] = self._failure
-        of = {loop.name: self._of(loop, system) for loop in self._loops}
-        if len(of) == 1:
-            return content | next(iter(of.values()))
-        return content | self.together | {VEHICLES: of}
+        vehicles = {loop.name: self._vehicle(loop, system) for loop in self._loops}
+        if len(vehicles) == 1:
+            return content | next(iter(vehicles.values()))
+        return content | self.together | {VEHICLES: vehicles}
 
-    def _of(self, loop: Loop, system: System) -> dict[str, Any]:
+    def _vehicle(self, loop: Loop, system: System) -> dict[str, Any]:
         found = self.found(loop)
         content: dict[str, Any] = {
             index.name: found[index.name] if len(index.units) > 1 else found[index.name][0]
@@ -290,12 +329,12 @@ class Metrics(Indices):
 
 
 def of_vehicles(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
-    """The indices that metrics.json holds, by the vehicle's name; of one vehicle, by none."""
+    """Return the indices in metrics.json by the vehicle's name, which is empty for a single one."""
     return dict(content.get(VEHICLES, {"": content}))
 
 
 def metrics_of(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> Metrics:
-    """The metrics of a run whose rows are all there."""
+    """Return the metrics of a finished run."""
     found = Metrics(loops)
     found.begin(table.header)
     found.take(table.rows)
@@ -304,7 +343,7 @@ def metrics_of(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> Metrics:
 
 
 def _differing(system: System, held: Mapping[PortName, Any]) -> Iterator[tuple[str, Any]]:
-    """The parameters that are not as their FMU has them, in a user's words."""
+    """Yield the parameters that differ from their FMU's defaults, as users write them."""
     for name, value in {**held, **system.parameters}.items():
         component = system.component(name.component)
         variable = component.variable(name.port)

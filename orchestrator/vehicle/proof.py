@@ -1,6 +1,6 @@
-"""What the proof says: Theorem 1 or 2 for some parameters, and along a run V and its margins.
+"""The proof in numbers: Theorem 1 or 2 for given parameters; V and its margins along a run.
 
-Certificates are computed from the true state of the vehicle, which the controller does not know.
+Certificates are computed from the true state of the vehicle, which the controller cannot measure.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from orchestrator.vehicle.signals import (
     vehicle,
 )
 
-#: What the paper says of these conditions, in Remark 4, and what they leave open.
+#: Remark 4 on these conditions, and what they leave open.
 _NOTE = """\
 The conditions are sufficient, and Remark 4 calls them conservative: a run may well be stable
 where they are violated. The zetas of (26) and (29) are known from below only, by states of a level
@@ -58,7 +58,7 @@ CERTIFICATE_COLUMNS = (
 
 
 def theorem_of(system: System, loop: Loop = STANDARD) -> Theorem:
-    """The theorem for the parameters of a loop.
+    """Evaluate the theorem for the parameters of a loop.
 
     Raises:
         InputError: a parameter does not exist or cannot be set.
@@ -69,17 +69,17 @@ def theorem_of(system: System, loop: Loop = STANDARD) -> Theorem:
     def value(name: str) -> Any:
         return system.value(PortName.read(name))
 
-    def of(name: str) -> Any:
+    def gain(name: str) -> Any:
         return value(f"{loop.controller}.{name}")
 
-    slope = MAXIMUM_SLOPE[_saturation(of("saturation"), f"{loop.controller}.saturation")]
-    K1, K2 = (tuple(of(f"{K}[{i}]") for i in range(1, 4)) for K in ("K1", "K2"))
-    gains = Gains(K1=K1, K2=K2, lambda_=of("lambda"), k_d=of("k_d"), gamma=of("gamma"))
+    slope = MAXIMUM_SLOPE[_saturation(gain("saturation"), f"{loop.controller}.saturation")]
+    K1, K2 = (tuple(gain(f"{K}[{i}]") for i in range(1, 4)) for K in ("K1", "K2"))
+    gains = Gains(K1=K1, K2=K2, lambda_=gain("lambda"), k_d=gain("k_d"), gamma=gain("gamma"))
     return theorem(vehicle(value, loop), value(loop.ell), gains, slope)
 
 
 def _saturation(value: object, name: str) -> Saturation:
-    """The saturation function that a parameter names, or has the number of.
+    """Return the saturation function with the name or number that a parameter has.
 
     Raises:
         InputError: there is none.
@@ -93,7 +93,7 @@ def _saturation(value: object, name: str) -> Saturation:
 
 
 def gain_check(system: System) -> str:
-    """The theorem in words and numbers, for the parameters of each loop of a system.
+    """Return the theorem in words and numbers, for the parameters of each loop of a system.
 
     Raises:
         InputError: a parameter does not exist or cannot be set.
@@ -113,7 +113,7 @@ def gain_check(system: System) -> str:
 
 
 def stated(found: Theorem) -> Iterator[str]:
-    """Bounds, conditions, alphas and region of attraction, in lines."""
+    """Yield lines with bounds, conditions, alphas and the region of attraction."""
     known, zetas, alphas = found.bounds, found.zetas, found.alphas
     yield "over all attitudes:"
     yield f"  lambda_m2 = {known.lambda_m2:.6g} kg, lambda_M2 = {known.lambda_M2:.6g} kg"
@@ -156,7 +156,7 @@ def stated(found: Theorem) -> Iterator[str]:
 
 
 def _sampling(system: System, loop: Loop) -> list[str]:
-    """What the step asks of k_d."""
+    """Return lines about the stability of Euler's scheme for k_d."""
     lambda_, h = (
         float(system.value(PortName.read(f"{loop.controller}.{name}")) or 0.0)
         for name in ("lambda", "h_max")
@@ -169,15 +169,8 @@ def _sampling(system: System, loop: Loop) -> list[str]:
     ]
 
 
-def missing_for_certificates(table: Table, loop: Loop = STANDARD) -> list[str]:
-    """Ports and parameters of the proposed controller and the vehicle that a run does not have."""
-    return table.missing(
-        _columns(loop), (*_gains(loop), *loop.limits, *loop.vehicle_parameters, loop.ell)
-    )
-
-
 def _columns(loop: Loop) -> tuple[str, ...]:
-    """The columns that certificates follow from."""
+    """Return the columns that certificates are computed from."""
     return (
         *loop.posture, *loop.dy, *loop.seen_y_d, *loop.seen_dy_d, *loop.y_hat, *loop.dy_hat,
         *loop.z, *loop.tau,
@@ -185,23 +178,23 @@ def _columns(loop: Loop) -> tuple[str, ...]:
 
 
 def _gains(loop: Loop) -> tuple[str, ...]:
-    """K_2, lambda and the saturation function: parameters of the proposed controller."""
+    """Return the names of K_2, lambda and the saturation function."""
     names = ("K2[1]", "K2[2]", "K2[3]", "lambda", "saturation")
     return tuple(f"{loop.controller}.{name}" for name in names)
 
 
 def certificates(table: Table, loop: Loop = STANDARD) -> np.ndarray:
-    """Table with :data:`CERTIFICATE_COLUMNS`, a row for each instant that the controller acted at.
+    """Return a table with :data:`CERTIFICATE_COLUMNS`, a row for each instant of control.
 
-    V is (34), or (55) for another saturation function, without its term in theta - theta_hat:
-    theta is unknown. r_1 is (17), r_2 is (19). The margin is the distance of a command from its
-    nearer limit, negative beyond it.
+    V is (34), or (55) for another saturation function, without its term in theta - theta_hat,
+    since theta is unknown. r_1 is (17), r_2 is (19). The margin is the distance of a command from
+    its nearer limit, negative outside the limits.
     """
     return _certificates(table.header, loop, table.rows[:-1], table.rows[1:])
 
 
 def _certificates(header: Header, loop: Loop, starts: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Certificates of some steps, from the rows at their starts and at their ends."""
+    """Return the certificates of steps, from the rows at their starts and at their ends."""
     acting = ends if header.experiment.acting_row else starts
     return np.array(list(_rows(loop, Table.of(header, starts), Table.of(header, acting))))
 
@@ -232,28 +225,23 @@ def _rows(loop: Loop, start: Table, acting: Table) -> Iterator[list[float]]:
 
 
 class CertificatesFile:
-    """An observer that writes the table as CSV, if the run has what it takes."""
+    """An observer that writes the certificates as CSV, if the run has the columns for them."""
 
     def __init__(self, path: Path, interval: float | None = None, loop: Loop = STANDARD) -> None:
-        """Write into a file, which is made when there is something to write.
-
-        Args:
-            path: of the file.
-            interval: an instant is written for each of these [s]; None: all.
-            loop: whose certificates they are.
-
-        """
+        """Choose the file, which is created when the first row is written, and an interval [s]."""
         self._path, self._loop = path, loop
         self._interval = interval
         self._file: TableFile | None = None
 
     def begin(self, header: Header) -> None:
-        """Find out whether there will be certificates."""
+        """Find out if the run has the columns and parameters for certificates."""
         self._every = header.every(self._interval)
         table = Table.of(header, np.empty((0, 1 + len(header.columns))))
-        self._is_possible = not missing_for_certificates(table, self._loop)
-        columns = _columns(self._loop) if self._is_possible else ()
-        # Rows of many vehicles are long.
+        loop = self._loop
+        parameters = (*_gains(loop), *loop.limits, *loop.vehicle_parameters, loop.ell)
+        self._is_possible = not table.missing(_columns(loop), parameters)
+        columns = _columns(loop) if self._is_possible else ()
+        # Keep only these columns: rows of many vehicles are long.
         self._places = [0, *(header.place[name] for name in columns)]
         self._header = replace(header, columns=columns)
         self._last = np.empty((0, len(self._places)))

@@ -1,37 +1,60 @@
-"""Reducers of a run in progress: what they keep of its rows, and what that comes to.
+"""Evaluation of reducers, such as indices, over the rows of a run in progress.
 
-Rows come in blocks; what is made of them does not depend on the blocks.
+Rows come in blocks, and results do not depend on the sizes of the blocks. A reducer is compiled if
+it is in the language of equations and there is a compiler; else its hooks are called in Python.
+Both give the same numbers, the compiled one far sooner.
 """
 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import product
+from collections.abc import Iterable, Mapping, Sequence
+from ctypes import CDLL, c_char_p, c_double, c_int, c_size_t, c_void_p, create_string_buffer
+from functools import cache, partial
+from itertools import chain, product
 from math import isnan
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.ports.groups import SCOPE, compiled, gathered
+from fmus.native.names import RUNTIME
+from fmus.ports.groups import SCOPE, compiled, flat, gathered
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer
 from orchestrator.cosim import Experiment, Header, Value
+from orchestrator.machine.compilers import (
+    EXPORTED,
+    FLAGS,
+    MATHEMATICS,
+    compile_text,
+    library_key,
+    load_library,
+    own_compiler,
+)
 from orchestrator.machine.errors import InputError
-from orchestrator.vehicle.compiled_reducers import CompiledReduction, Raised, library_of
+from orchestrator.machine.identity import code_of
 from orchestrator.vehicle.signals import Loop
 
-#: How a double of a row becomes a value of a port, by its type.
+#: Category of the libraries in the cache.
+CATEGORY = "indices"
+
+#: The package of the bundled indices, and the packages that determine their libraries.
+_OURS = "orchestrator.vehicle.index."
+_MADE_OF = ("auv_fmu", "fmus.language", "fmus.native", "fmus.ports", "orchestrator.vehicle")
+
+_OPTIONS = (*FLAGS, *EXPORTED, f"-I{RUNTIME}", "-w", *MATHEMATICS)
+
+#: Expressions that turn a double of a row into a value of a port, by the port's type.
 _MADE, _WHOLE = {"Real": "{}", "Boolean": "bool({})"}, "int({})"
 
 
 class Sources(NamedTuple):
-    """Where the inputs of a reducer come from in a run.
+    """Sources of a reducer's inputs in a run.
 
     Attributes:
-        places: in a row, time first, of those that change, by the names of their ports.
-        constants: values of the others.
-        missing: what they are called in the run that it lacks.
+        places: columns of the inputs that change, by the names of their ports; time is column 0.
+        constants: values of the other inputs.
+        missing: names of signals and parameters that the run lacks.
 
     """
 
@@ -43,16 +66,16 @@ class Sources(NamedTuple):
 def sources_of(
     reducer: Reducer, loop: Loop, places: Mapping[str, int], values: Mapping[str, Any]
 ) -> Sources:
-    """Where the inputs of a reducer come from.
+    """Find the sources of a reducer's inputs.
 
     Args:
-        reducer: that takes them.
-        loop: whose names they have.
-        places: of the columns of the run in a row, time first.
-        values: of its parameters.
+        reducer: the reducer.
+        loop: the loop whose signals it takes.
+        places: numbers of the columns of the run, by their names; time is column 0.
+        values: parameters of the run.
 
     Raises:
-        InputError: a parameter is no number.
+        InputError: a parameter is not a number.
 
     """
     found = Sources({}, {}, [])
@@ -72,10 +95,10 @@ def sources_of(
 
 
 def _number(port: Port, name: str, value: Any) -> Value:
-    """The value of a parameter in the type of a port.
+    """Convert the value of a parameter to the type of a port.
 
     Raises:
-        InputError: it is of another one.
+        InputError: it has another type.
 
     """
     if isinstance(value, str) and value in port.choices:
@@ -88,10 +111,10 @@ def _number(port: Port, name: str, value: Any) -> Value:
 def reductions_of(
     reducers: Iterable[Reducer], loops: Sequence[Loop], header: Header
 ) -> dict[Loop, dict[Reducer, Reduction]]:
-    """Reducers of each vehicle in a run that is about to begin: those that it has all inputs for.
+    """Start reducers for each vehicle of a run, except those for which the run lacks an input.
 
     Raises:
-        InputError: a parameter that they take is no number.
+        InputError: a parameter that they take is not a number.
 
     """
     values = {str(name): value for name, value in header.parameters.items()}
@@ -103,8 +126,20 @@ def reductions_of(
     return found
 
 
+# Evaluation, in Python or compiled
+
+
+class Raised(ArithmeticError):
+    """An exception of a hook, and the time of the row at which it was raised [s]."""
+
+    def __init__(self, why: str, time: float) -> None:
+        """Take the message and the time."""
+        super().__init__(why)
+        self.time = time
+
+
 class _Interpreted:
-    """A reducer of rows in Python."""
+    """A reducer whose hooks are called in Python."""
 
     def __init__(self, reducer: Reducer, sources: Sources, run: Experiment) -> None:
         self._reducer, self._run = reducer, run
@@ -135,10 +170,10 @@ class _Interpreted:
             raise Raised(f"{type(error).__name__}: {error}", t) from error
 
     def take(self, rows: np.ndarray) -> None:
-        """Take some rows into account.
+        """Process rows.
 
         Raises:
-            Raised: by one of them.
+            Raised: a hook has raised an exception.
 
         """
         for row in rows.tolist():
@@ -153,40 +188,135 @@ class _Interpreted:
             self._before, self._time = inputs, t
 
     def found(self) -> list[float]:
-        """The numbers of the results.
+        """Return the numbers of the results.
 
         Raises:
-            Raised: by what gives them.
+            Raised: a hook has raised an exception.
 
         """
-        return [*_flat(self._call("outputs", self._time))]
+        return [*map(float, flat(self._call("outputs", self._time)))]
+
+
+class _Compiled:
+    """A compiled reducer."""
+
+    def __init__(
+        self,
+        library: CDLL,
+        reducer: Reducer,
+        places: Mapping[str, int],
+        constants: Mapping[str, Value],
+        run: Experiment,
+    ) -> None:
+        """Start without rows."""
+        self._library, self._reducer, self._run = library, reducer, run
+        self._memory = create_string_buffer(library.size_of_rows())
+        names = [port.name for port in reducer.ports]
+        self._from = np.array([places.get(name, -1) for name in names], dtype=np.intc)
+        self._constants = np.array([float(constants.get(name, 0.0)) for name in names])
+
+    def take(self, rows: np.ndarray) -> None:
+        """Process rows.
+
+        Raises:
+            Raised: a hook has raised an exception.
+
+        """
+        rows = np.ascontiguousarray(rows)
+        taken = self._library.take_rows(
+            self._memory, rows.ctypes.data, len(rows), rows.shape[1], self._from.ctypes.data,
+            self._constants.ctypes.data, self._run.acting_row, self._run.start_time,
+            self._run.stop_time,
+        )  # fmt: skip
+        if taken < len(rows):
+            raise Raised(self._library.why(self._memory).decode(), float(rows[taken, 0]))
+
+    def found(self) -> list[float]:
+        """Return the numbers of the results.
+
+        Raises:
+            Raised: a hook has raised an exception.
+
+        """
+        found = np.empty(sum(1 for _ in chain(*self._reducer.results.values())))
+        run = self._run
+        if self._library.give_numbers(
+            self._memory, run.start_time, run.stop_time, found.ctypes.data
+        ):
+            raise Raised(self._library.why(self._memory).decode(), run.stop_time)
+        numbers: list[float] = found.tolist()
+        return numbers
+
+
+@cache
+def library_of(reducer: Reducer) -> CDLL | None:
+    """Load or compile the library of a reducer; None if it cannot be compiled quickly."""
+    module = reducer.hooks["update"].__module__
+    # Translating takes far longer than hashing the code that translates.
+    made_of = module if module.startswith(_OURS) else _text(reducer)
+    if made_of is None:
+        return None
+    key = library_key(made_of, code_of(*_MADE_OF), *_OPTIONS)
+    try:
+        library = load_library(CATEGORY, key, "take_rows", partial(_compile, reducer))
+    except OSError:
+        return None
+    library.size_of_rows.restype = c_size_t
+    library.why.argtypes, library.why.restype = (c_void_p,), c_char_p
+    library.take_rows.argtypes = (
+        c_void_p, c_void_p, c_int, c_int, c_void_p, c_void_p, c_int, c_double, c_double,
+    )  # fmt: skip
+    library.give_numbers.argtypes = (c_void_p, c_double, c_double, c_void_p)
+    return library
+
+
+@cache
+def _text(reducer: Reducer) -> str | None:
+    """Translate a reducer to C; None if it is outside the language of equations."""
+    # Slow to import, and most runs find a library in the cache.
+    from fmus.native.reducer import text_over_rows  # noqa: PLC0415
+
+    return text_over_rows(reducer)
+
+
+def _compile(reducer: Reducer) -> bytes:
+    """Compile the library of a reducer.
+
+    Raises:
+        OSError: it cannot be compiled.
+
+    """
+    compiler, text = own_compiler(), _text(reducer)
+    if compiler is None or text is None:
+        raise OSError(f"{reducer.name} cannot be compiled")
+    return compile_text(compiler, text, *_OPTIONS)
 
 
 class Reduction:
     """A reducer of a run in progress.
 
     Attributes:
-        failure: what a hook has raised, and when; after that it reduces nothing; empty: nothing.
+        failure: exception of a hook with its time, after which rows are ignored; empty if none.
 
     """
 
     def __init__(self, reducer: Reducer, sources: Sources, run: Experiment) -> None:
-        """Start with no rows."""
+        """Start without rows."""
         self._reducer, self._sources, self._run = reducer, sources, run
         self._columns = [0, *sources.places.values()]
         self._recent: deque[np.ndarray] = deque()
         self._reducing, self._has_rows = self._begun(), False
         self.failure = ""
 
-    def _begun(self) -> _Interpreted | CompiledReduction:
+    def _begun(self) -> _Interpreted | _Compiled:
         library = library_of(self._reducer)
         if library is None:
             return _Interpreted(self._reducer, self._sources, self._run)
         places = {name: i for i, name in enumerate(self._sources.places, 1)}
-        return CompiledReduction(library, self._reducer, places, self._sources.constants, self._run)
+        return _Compiled(library, self._reducer, places, self._sources.constants, self._run)
 
     def take(self, rows: np.ndarray) -> None:
-        """Take some rows of the run into account."""
+        """Process rows of the run."""
         rows = rows[:, self._columns]
         if self._reducer.last is None:
             self._reduce(rows)
@@ -208,7 +338,7 @@ class Reduction:
         self.failure = f"{self._reducer.name}: at t = {error.time:g} s: {error}"
 
     def found(self) -> dict[str, list[float]]:
-        """The members of its indices by their names; what is not a number is not there."""
+        """Return the members of its indices by name; indices that are not a number are left out."""
         if self._recent and self._reducer.last is not None:
             rows = np.vstack(self._recent)
             self._reducing = self._begun()
@@ -223,12 +353,3 @@ class Reduction:
         results = self._reducer.results.items()
         values = {name: [next(numbers) for _ in ports] for name, ports in results}
         return {name: found for name, found in values.items() if not all(map(isnan, found))}
-
-
-def _flat(value: Any) -> Iterator[float]:
-    """The numbers in a value, in their order."""
-    if not isinstance(value, tuple):
-        yield float(value)
-        return
-    for part in value:
-        yield from _flat(part)

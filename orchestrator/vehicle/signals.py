@@ -1,7 +1,7 @@
-"""The signals of a vehicle's loop by the paper's names: which port of which component they are.
+"""Signals of a vehicle's loop: from the paper's names to ports of components.
 
-The master steps any system and knows none of these names. What is drawn, measured and proved here
-needs some of them; `Table.missing` tells which a run does not have.
+The master steps any system and uses none of these names. Figures, indices and certificates need
+some of them; `Table.missing` lists those that a run lacks.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from auv_fmu.paper.attitude import rotation_from_euler
 from auv_fmu.paper.control_point import control_point
 from auv_fmu.paper.vehicle import Vehicle
 from orchestrator.cosim import PortName, System, Table, Value
+from orchestrator.machine.disk import file_name
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.file_names import file_name
 
 #: Members of groups of ports, in the paper's order.
 ACTUATORS, AXES = tuple(map(str, quantities.TAU)), tuple(map(str, quantities.POSITION))
 EULER, DIRECTIONS = tuple(map(str, quantities.EULER)), tuple(map(str, quantities.NU))
 
-#: Columns, and parameters, that something needs: what :meth:`.Table.missing` takes.
+#: Columns and parameters that a figure or computation needs: arguments of :meth:`.Table.missing`.
 Needs = tuple[Sequence[str], Sequence[str]]
 
 
@@ -43,7 +43,7 @@ class _Group:
 
 @dataclass(frozen=True)
 class Loop:
-    """A vehicle and what controls it: names of components, and from them the names of signals."""
+    """A vehicle and its controller: names of components, and the names of signals from them."""
 
     vehicle: str = "plant"
     controller: str = "controller"
@@ -57,13 +57,13 @@ class Loop:
     nu = _Group("vehicle", "nu", DIRECTIONS)
     #: Velocity of the control point [m/s].
     dy = _Group("vehicle", "dy", AXES)
-    #: tau as commanded, and as (3) lets it through [N, N.m].
+    #: tau as commanded, and after the limits of (3) [N, N.m].
     commanded = _Group("vehicle", "tau", ACTUATORS)
     applied = _Group("vehicle", "tau_applied", ACTUATORS)
-    #: y_d and its velocity, as they are planned and as the controller was given them.
+    #: y_d and its velocity: outputs of the planner, and inputs of the controller.
     y_d, dy_d = _Group("planner", "y_d", AXES), _Group("planner", "dy_d", AXES)
     seen_y_d, seen_dy_d = _Group("controller", "y_d", AXES), _Group("controller", "dy_d", AXES)
-    #: What the controller has measured, estimated and computed.
+    #: Errors, estimates and command of the controller.
     e, z = _Group("controller", "e", AXES), _Group("controller", "z", AXES)
     y_hat, dy_hat = _Group("controller", "y_hat", AXES), _Group("controller", "dy_hat", AXES)
     theta_hat = _Group("controller", "theta_hat", quantities.THETA)
@@ -75,7 +75,7 @@ class Loop:
 
     @property
     def name(self) -> str:
-        """What the vehicle is called: `auv1`, where `auv1.plant` is its component."""
+        """Name of the vehicle: `auv1`, if its component is `auv1.plant`."""
         return self.vehicle.removesuffix(f".{type(self).vehicle}")
 
     @property
@@ -85,98 +85,98 @@ class Loop:
 
     @property
     def ell(self) -> str:
-        """The parameter ell [m]: how far the control point lies ahead of the centre of mass."""
+        """The parameter ell [m]: distance of the control point ahead of the centre of mass."""
         return f"{self.vehicle}.ell"
 
     def port(self, name: str) -> str:
-        """The name here of a signal or parameter, from its name in the standard loop."""
+        """Return the name in this loop of a signal or parameter of the standard loop."""
         component, _, port = name.partition(".")
         role = _ROLES.get(component)
         return f"{getattr(self, role)}.{port}" if role else name
 
     @property
     def implied(self) -> Mapping[str, float]:
-        """Parameters whose values follow from what the loop is, by their names in the standard."""
+        """Parameters that the kind of loop determines, by their names in the standard loop."""
         return {}
 
     def drawn(self) -> tuple[str, ...]:
-        """All signals that stand in figures."""
+        """Return all signals in figures."""
         return (
             *self.position, *self.nu, *self.dy, *self.commanded, *self.y_d, *self.dy_hat,
             *self.theta_hat, *self.e,
         )  # fmt: skip
 
     def for_control_point(self) -> Needs:
-        """What the control point follows from."""
+        """Return what the control point is computed from."""
         return self.posture, (self.ell,)
 
     def for_tracking(self) -> Needs:
-        """What the tracking error follows from."""
+        """Return what the tracking error is computed from."""
         return (*self.posture, *self.y_d), (self.ell,)
 
     def for_reference(self) -> Needs:
-        """What the path of the reference follows from."""
+        """Return the signals of the reference path."""
         return self.y_d, ()
 
     def for_commands(self) -> Needs:
-        """What the control signals follow from."""
+        """Return the commanded signals."""
         return self.commanded, ()
 
     def for_limits(self) -> Needs:
-        """What their limits follow from."""
+        """Return the parameters of the limits of (3)."""
         return (), self.limits
 
     def for_parameter_estimates(self) -> Needs:
-        """What theta_hat follows from."""
+        """Return the signals of theta_hat."""
         return self.theta_hat, ()
 
     def for_velocity_estimates(self) -> Needs:
-        """What true and estimated velocities follow from."""
+        """Return the signals of the true and estimated velocities."""
         return (*self.dy, *self.dy_hat), ()
 
 
 @dataclass(frozen=True)
 class AllocatedLoop(Loop):
-    """A loop whose vehicle takes no tau: an allocation does, and commands what drives it."""
+    """A loop whose vehicle has no input tau: an allocation turns tau into its inputs."""
 
     allocation: str = "allocation"
 
     commanded = _Group("allocation", "tau", ACTUATORS)
 
     def port(self, name: str) -> str:
-        """The name here of a signal or parameter, from its name in the standard loop."""
+        """Return the name in this loop of a signal or parameter of the standard loop."""
         if name in STANDARD.commanded:
             return f"{self.allocation}.{name.partition('.')[2]}"
         return super().port(name)
 
     @property
     def implied(self) -> Mapping[str, float]:
-        """What gives the applied signal has a state, as an actuator with a lag has."""
+        """Lags of the actuators: the applied signal follows from a state, as with a lag."""
         return {f"plant.actuator.T.{actuator}": inf for actuator in ACTUATORS}
 
 
 #: The loop of closed_loop.toml, the paper's Fig. 2.
 STANDARD = Loop()
 
-#: What components are in a loop, by their names in the standard one.
+#: Roles of components by their names in the standard loop.
 _ROLES = {getattr(STANDARD, one.name): one.name for one in fields(STANDARD)}
 
 
 def loop_of(names: Mapping[str, str]) -> Loop:
-    """The loop whose components have these names, by their roles."""
+    """Make a loop from the names of its components, by their roles."""
     return AllocatedLoop(**names) if "allocation" in names else Loop(**names)
 
 
 def loops_of(system: System) -> tuple[Loop, ...]:
-    """The loops of a system, one for each vehicle, found by ports and wires.
+    """Find the loops of a system, one for each vehicle, by ports and connections.
 
-    A vehicle gives eta, and takes tau or gives tau_applied. Of what feeds it, directly or through
-    others, the controller takes y_d, which the planner gives, and an allocation takes tau if the
-    vehicle does not. What one vehicle lacks has the standard name; what one of several lacks has a
-    name that no component has.
+    A vehicle has the output eta, and the input tau or the output tau_applied. Among the components
+    upstream of it, the controller has the input y_d, and the planner the output y_d; if the vehicle
+    has no input tau, an allocation has it. A missing component of a single vehicle gets the
+    standard name; one of several vehicles gets a name that no component has.
 
     Returns:
-        At least one loop: where no vehicle is found, the standard one.
+        At least one loop: without a vehicle, the standard one.
 
     """
     vehicles = [
@@ -189,7 +189,7 @@ def loops_of(system: System) -> tuple[Loop, ...]:
 
 
 def suffixes(loops: Sequence[Loop]) -> dict[Loop, str]:
-    """What the names of files end with that hold one of these loops: of several, the vehicle."""
+    """Return suffixes for names of files about one loop: with several, the vehicle's name."""
     if len(loops) == 1:
         return {loops[0]: ""}
     found: dict[Loop, str] = {}
@@ -205,7 +205,7 @@ def _has(system: System, component: str, causality: str, port: str) -> bool:
 
 def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
     def feeding(component: str, group: str, role: str, causality: str, port: str) -> str:
-        """The nearest component with a port upstream of another, or else what feeds a group."""
+        """Find the nearest component upstream with a port, else the one that feeds a group."""
         if component in system.components:
             wires = list(system.reaching(component, set(vehicles)))
             group = f"{component}.{group}."
@@ -225,16 +225,16 @@ def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
 
 
 def value_of(table: Table, name: str) -> Value | None:
-    """The value of a parameter `component.name` in a run; None: there is none."""
+    """Return the value of a parameter `component.name` in a run; None if there is none."""
     names = (PortName(component, port) for component, port in PortName.splits(name))
     return next((table.parameters[one] for one in names if one in table.parameters), None)
 
 
 def real_parameter(table: Table, name: str) -> float:
-    """The value of a Real parameter `component.name` in a run.
+    """Return the value of a Real parameter `component.name` in a run.
 
     Raises:
-        InputError: the record of the run holds something else.
+        InputError: it is missing or has another type.
 
     """
     value = value_of(table, name)
@@ -244,7 +244,7 @@ def real_parameter(table: Table, name: str) -> float:
 
 
 def limits(table: Table, loop: Loop = STANDARD) -> tuple[np.ndarray, np.ndarray]:
-    """The limits of (3), lower and upper, for u, q, r [N, N.m]."""
+    """Return the limits of (3), lower and upper, for u, q, r [N, N.m]."""
     return (
         np.array([real_parameter(table, name) for name in loop.lower_limits]),
         np.array([real_parameter(table, name) for name in loop.upper_limits]),
@@ -252,18 +252,18 @@ def limits(table: Table, loop: Loop = STANDARD) -> tuple[np.ndarray, np.ndarray]
 
 
 def applied(table: Table, loop: Loop = STANDARD) -> np.ndarray:
-    """What acts on the vehicle in each step, (rows - 1, 3) [N, N.m].
+    """Return tau as applied in each step, (rows - 1, 3) [N, N.m].
 
-    Actuators with a lag have a state: what they give at the end of the step counts.
+    Actuators with a lag have a state, so for them the value at the end of the step counts.
     """
     at_once = table.step_values(*loop.applied)
-    if not (late := with_lag(table, loop)).any():
+    if not (late := _with_lag(table, loop)).any():
         return at_once
     return np.where(late, table.group(*loop.applied)[1:], at_once)
 
 
-def with_lag(table: Table, loop: Loop) -> np.ndarray:
-    """Which actuators have a lag: of a vehicle that takes no tau, all."""
+def _with_lag(table: Table, loop: Loop) -> np.ndarray:
+    """Return True for each actuator with a lag: all, if the vehicle has an allocation."""
     if isinstance(loop, AllocatedLoop):
         return np.ones(len(ACTUATORS), bool)
     names = (PortName(loop.vehicle, f"actuator.T.{actuator}") for actuator in ACTUATORS)
@@ -271,12 +271,12 @@ def with_lag(table: Table, loop: Loop) -> np.ndarray:
 
 
 def vehicle(value: Callable[[str], float], loop: Loop = STANDARD) -> Vehicle:
-    """The vehicle of (2), whose parameters a function gives by their names `plant.m11`, ..."""
+    """Make the vehicle of (2) from a function of the names of its parameters: `plant.m11`, ..."""
     return Vehicle._make(value(name) for name in loop.vehicle_parameters)
 
 
 def waypoints(table: Table, loop: Loop = STANDARD) -> np.ndarray:
-    """The waypoints of a planner that has some, (n, 3) [m]."""
+    """Return the waypoints of a planner, (n, 3) [m]; n is 0 without waypoints."""
     n = value_of(table, f"{loop.planner}.count")
     names = (f"{loop.planner}.waypoint[{k}]" for k in range(1, int(n or 0) + 1))
     return np.array(
@@ -285,7 +285,7 @@ def waypoints(table: Table, loop: Loop = STANDARD) -> np.ndarray:
 
 
 def true_control_point(table: Table, loop: Loop = STANDARD) -> np.ndarray:
-    """y without measurement noise: (9) on the vehicle's posture, (rows, 3) [m]."""
+    """Return y without measurement noise: (9) for the vehicle's posture, (rows, 3) [m]."""
     ell = real_parameter(table, loop.ell)
     return np.array(
         [
@@ -296,6 +296,6 @@ def true_control_point(table: Table, loop: Loop = STANDARD) -> np.ndarray:
 
 
 def tracking_error(table: Table, loop: Loop = STANDARD) -> np.ndarray:
-    """e = y - y_d with the true control point, both of the same row, (rows, 3) [m]."""
+    """Return e = y - y_d with the true control point, both of the same row, (rows, 3) [m]."""
     error: np.ndarray = true_control_point(table, loop) - table.group(*loop.y_d)
     return error

@@ -21,8 +21,7 @@ from fmus import check
 from fmus.ports.behaviour import HOOKS
 from orchestrator.commands.main import main
 from orchestrator.cosim import Experiment
-from orchestrator.machine.compilers import machines_compiler
-from orchestrator.machine.platforms import TARGETS
+from orchestrator.machine.compilers import TARGETS, machines_compiler
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.result import read_result
 from support.markdown import DOCS, blocks

@@ -17,15 +17,16 @@ from fmpy.validation import validate_fmu
 from lxml import etree
 
 from auv_fmu.language.quantities import group_name
-from fmus.discovery import components, package_folder, source_of
+from fmus.discovery import components, source_of
 from fmus.kinds import NATIVE, PYTHON
-from fmus.ports.description import fmi2_description
-from fmus.ports.description_fmi3 import (
+from fmus.ports.description import (
+    fmi2_description,
     fmi3_build_description,
     fmi3_description,
-    terminals_and_icons,
 )
 from fmus.ports.port import TIME
+from fmus.ports.terminals import terminals_of
+from orchestrator.machine.identity import package_folder
 from support.raw import Library, Status, instance
 from support.settings import ports_of
 
@@ -67,7 +68,7 @@ def fmi3(python: ModelDescription, tmp_path_factory) -> Path:
     path = written(tmp_path_factory.mktemp("fmi3"), fmi3_description, name)
     for file, content in (
         ("sources/buildDescription.xml", fmi3_build_description(name)),
-        ("terminalsAndIcons/terminalsAndIcons.xml", terminals_and_icons(ports_of(name))),
+        ("terminalsAndIcons/terminalsAndIcons.xml", terminals_of({"": ports_of(name)})),
     ):
         (path / file).parent.mkdir()
         (path / file).write_bytes(content)
@@ -165,7 +166,7 @@ def test_only_what_names_the_time_depends_on_it(fmi3: Path):
 
 def terminals(name: str) -> dict[str, tuple[str, dict[str, str]]]:
     """The rule of each terminal of a component, and the variables of its members."""
-    root = etree.fromstring(terminals_and_icons(ports_of(name)))
+    root = etree.fromstring(terminals_of({"": ports_of(name)}))
     etree.XMLSchema(file=str(SCHEMA)).assertValid(root)
     return {
         terminal.get("name"): (

@@ -15,8 +15,7 @@ import pytest
 from fmpy.build import build_platform_binary
 
 from orchestrator.cosim import Experiment, System, Table
-from orchestrator.machine.compilers import machines_compiler
-from orchestrator.machine.platforms import TARGETS
+from orchestrator.machine.compilers import TARGETS, machines_compiler
 from support.hosts import bare_root, libraries_of
 from support.replay import compile_replay, replay
 from support.runs import run, system_of

@@ -26,8 +26,7 @@ from fmus import check
 from fmus.native.packaging import NativeKind
 from fmus.python.packaging import PythonKind, best_loader
 from fmus.script import source_of_script
-from orchestrator.machine.compilers import compiler_for
-from orchestrator.machine.platforms import platforms
+from orchestrator.machine.compilers import compiler_for, platforms
 from support.raw import Host, Library, Variable, instance
 
 FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR, EMPTY = (

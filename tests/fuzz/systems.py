@@ -70,9 +70,8 @@ from orchestrator.cosim.connection import can_feed
 from orchestrator.live import module
 from orchestrator.live.module import MODULE
 from orchestrator.live.programs import OF_PROGRAM, Source
-from orchestrator.machine.compilers import compiler_for
+from orchestrator.machine.compilers import compiler_for, platforms
 from orchestrator.machine.errors import InputError
-from orchestrator.machine.platforms import platforms
 from orchestrator.program.writer import Equations, Text
 from support.programs import compiled, play, values_of
 

@@ -51,7 +51,7 @@ DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|language\.build\.Untranslat
 
 #: What those import besides that translate components or indices.
 TRANSLATED = re.compile(r"fmus\.(documentation|language|native|script)(\.|$)")
-TRANSLATING = (("program",), ("vehicle", "compiled_reducers"))
+TRANSLATING = (("program",), ("vehicle", "reduction"))
 
 #: Rooms that run any system. Components are built with the lower one.
 GENERAL = ("machine", "cosim")
@@ -241,7 +241,7 @@ def test_no_modules_import_each_other():
 
 #: What tells one operating system from another, and the modules of the orchestrator that may ask.
 ASKS = {("os", "name"), ("sys", "platform"), ("platform", "system"), ("sys", "getwindowsversion")}
-ASKING = {("machine", name) for name in ("compilers", "operating_system", "platforms")}
+ASKING = {("machine", name) for name in ("compilers", "operating_system")}
 
 
 def test_the_lowest_room_asks_which_operating_system_there_is():

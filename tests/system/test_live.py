@@ -27,7 +27,7 @@ from orchestrator.runs import bundle
 from orchestrator.runs.own_components import new_controller
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import names
-from orchestrator.vehicle import compiled_reducers
+from orchestrator.vehicle import reduction
 from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
 from support.events import ALL, ENDS
@@ -180,9 +180,9 @@ def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path
     (tmp_path / "same.wasm").write_bytes(content)
     said = parts._replace(modules=[tmp_path / "same.wasm"]).node("rows.mjs", str(tmp_path))
     fmus = with_same_functions(bundle.current_fmus(NATIVE), tmp_path)
-    options = (*compiled_reducers._OPTIONS, "-include", str(SAME_FUNCTIONS))
-    monkeypatch.setattr(compiled_reducers, "_OPTIONS", options)
-    compiled_reducers.library_of.cache_clear()
+    options = (*reduction._OPTIONS, "-include", str(SAME_FUNCTIONS))
+    monkeypatch.setattr(reduction, "_OPTIONS", options)
+    reduction.library_of.cache_clear()
     for room in ("runs.loading", "runs.preparation"):
         monkeypatch.setattr(f"orchestrator.{room}.current_fmus", lambda *_: fmus)
     for name in names():
@@ -194,7 +194,7 @@ def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path
             assert found.tobytes() == wanted.tobytes(), (name, i)
             assert said[f"{name}.{i}"].get("failure") == ending.failure
             compare_indices(run, table, found, said[f"{name}.{i}"], ())
-    compiled_reducers.library_of.cache_clear()
+    reduction.library_of.cache_clear()
     # They are not the rows of any C library.
     assert (tmp_path / "fig4.0").read_bytes() != (rows.folder / "fig4.0").read_bytes()
 

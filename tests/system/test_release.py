@@ -25,7 +25,7 @@ from fmus.kinds import FMI_VERSIONS
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.live import assembly, module
-from orchestrator.machine.platforms import platforms
+from orchestrator.machine.compilers import platforms
 from orchestrator.runs import bundle
 from ready_wheel import write_programs, write_wheel
 from support.live import needs_npm, needs_zig

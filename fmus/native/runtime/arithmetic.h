@@ -1,16 +1,17 @@
 /* Python's arithmetic.
  *
- * Where Python raises, the equations go on with what C gives, and the first error is noted: nothing
- * that is computed after it is used. Functions of math that raise stand beside the equations.
+ * If Python would raise an exception, the first error is noted, the equations continue with the
+ * result of C, and later results are not used. Functions of math that raise are defined next to the
+ * equations.
  */
 #ifndef ARITHMETIC_H
 #define ARITHMETIC_H
 
 #if defined(__FAST_MATH__) || defined(_M_FP_FAST)
-#error "Leave -ffast-math or /fp:fast out: the numbers would not be those of Python."
+#error "Compile without -ffast-math and /fp:fast, which change numbers."
 #endif
 
-/* Each operation is rounded separately, as in Python, also where a compiler would contract some. */
+/* Each operation is rounded separately, as in Python: compilers must not contract operations. */
 #if defined(__clang__)
 #pragma STDC FP_CONTRACT OFF
 #elif defined(__GNUC__) && defined(__FP_FAST_FMA)
@@ -26,7 +27,7 @@
 
 #include "error.h"
 
-/* The text of two errors. */
+/* Texts of errors. */
 #define DOMAIN_ERROR "ValueError: math domain error"
 #define RANGE_ERROR "OverflowError: math range error"
 
@@ -35,7 +36,7 @@ static inline double py_div(double a, double b, Error *error) {
     return a / b;
 }
 
-/* A result that is infinite for a finite argument is out of range. */
+/* An infinite result for a finite argument is out of range. */
 static inline double bounded_result(double x, double y, Error *error) {
     raise_if(isinf(y) && !isinf(x), error, RANGE_ERROR);
     return y;
@@ -50,7 +51,7 @@ static inline double math_pow(double x, double y, Error *error) {
     return z;
 }
 
-/* Python's x ** y for a whole y; for another one Python's result may be complex. */
+/* Python's x ** y for a whole y; for another y Python's result may be complex. */
 static inline double py_pow(double x, double y, Error *error) {
     double z = pow(x, y);
     if (x == 0.0 && y < 0.0)
@@ -93,7 +94,7 @@ static inline double py_floordiv(double x, double y, Error *error) {
     return n - whole > 0.5 ? whole + 1.0 : whole;
 }
 
-/* Integers. Python's have no limit, these have 32 bits: what exceeds them is an error. */
+/* Integers of 32 bits; a larger result is an error, while Python's integers have no limit. */
 
 static inline int integer(long long k, Error *error) {
     if (k >= INT_MIN && k <= INT_MAX) return (int)k;
@@ -101,7 +102,7 @@ static inline int integer(long long k, Error *error) {
     return 0;
 }
 
-/* A float without a fraction as an integer. */
+/* Converts a float without a fraction to an integer. */
 static inline int int_of(double x, Error *error) {
     if (x >= INT_MIN && x <= INT_MAX) return (int)x;
     raise_error(error, isnan(x)   ? "ValueError: cannot convert float NaN to integer"
@@ -151,19 +152,19 @@ static inline int int_mod(int a, int b, Error *error) {
     return (int)(z != 0 && (z < 0) != (b < 0) ? z + b : z);
 }
 
-/* The smaller and the larger: the first one, unless the second is beyond it. */
+/* Python's min and max: the first argument, unless the second is smaller or larger. */
 static inline double smaller(double a, double b) { return b < a ? b : a; }
 static inline double larger(double a, double b) { return b > a ? b : a; }
 static inline int smaller_int(int a, int b) { return b < a ? b : a; }
 static inline int larger_int(int a, int b) { return b > a ? b : a; }
 
-/* To the nearest integer, and from the middle to the even one. */
+/* Rounds to the nearest integer, and halves to the even one. */
 static inline double nearest(double x) {
     double y = round(x);
     return fabs(x - y) == 0.5 ? 2.0 * round(x / 2.0) : y;
 }
 
-/* A place in an array of n elements; negative ones count from its end. */
+/* Returns an index into an array of n elements; negative indices count from its end. */
 static inline int place_in(int i, int n, Error *error) {
     if (i >= 0 && i < n) return i;
     if (i < 0 && i >= -n) return i + n;

@@ -1,43 +1,43 @@
-/* What every call begins with, instances, and the host's states. */
+/* The beginning of every call, instances, and the host's states. */
 #include <stdio.h>
 
-/* Of the runtime: */
+/* Defined by the runtime: */
 
-/* Begins a call of an instance, which no other thread is in then, and ends it with its status. */
+/* Begins a call, and locks its instance for other threads; ends it, and returns its status. */
 static call begin(void *handle, string function, int allowed);
 static int end(call *this);
 
-/* Whether a call may come in the mode of the instance; else it fails. */
+/* Returns true if a call is allowed in the mode of the instance; otherwise lets it fail. */
 static int check_mode(call *this);
 
 /* Logs a message of an instance. */
 static void log_message(instance *it, int status, string text);
 
-/* Makes the rest of an instance, and gives its handle; NULL, and why: it cannot be made. */
+/* Completes an instance, and returns its handle; NULL, and the reason, if that is impossible. */
 static void *new_component(instance *it, string token, string location, int visible, message *why);
 
-/* Frees an instance, whose handle is no more; one that has no handle yet. */
+/* Frees an instance after its handle was freed; frees an instance without a handle. */
 static void free_component(call *this);
 static void release_instance(instance *it);
 
-/* Makes what the handle of a state stands for, of an instance or of bytes; NULL: it could not be
- * made, for want of memory if the call has not been refused. */
+/* Makes a state from an instance or from bytes; NULL if that failed, for lack of memory unless the
+ * call has been refused. */
 static void *make_saved(call *this);
 static void *read_saved(call *this, const void *bytes, size_t size);
 
-/* Its bytes, and its end. */
+/* Size, bytes and release of a state. */
 static size_t size_of_saved(call *this, void *saved);
 static void write_saved(call *this, void *saved, void *bytes, size_t size);
 static void free_saved(instance *it, void *saved);
 
 /* Calls */
 
-/* Whether a call goes on: only then are its arguments checked, and after them its mode. */
+/* True if a call has an instance, valid arguments and an allowed mode, checked in this order. */
 #define GOES_ON(call, wrong)                                                                     \
     ((call).instance != NULL && (call).status == FMI_OK && check(&(call), wrong) &&              \
      check_mode(&(call)))
 
-/* A function of FMI: does something, unless it may not come or has a wrong argument. */
+/* A function of FMI: performs its action if the call is valid. */
 #define FUNCTION(name, allowed, wrong, parameters, ...)                                          \
     EXPORT int NAMED(name) parameters {                                                          \
         call this = begin(c, #name, allowed);                                                    \
@@ -53,7 +53,7 @@ static call lock_instance(void *handle, string function, int allowed) {
     string wrong;
     this.entry = lock_entry(handle, INSTANCE, &wrong);
     if (this.entry == NULL) {
-        /* There is no logger to call: one that calls its instance would do so again. */
+        /* Not to the logger: a logger that calls its instance would do so again. */
         fprintf(stderr, "%s: %s\n", function, wrong);
         return this;
     }
@@ -68,7 +68,7 @@ static void log_error(instance *it, string function, string wrong) {
     log_message(it, FMI_ERROR, said.text);
 }
 
-/* Fails a call if anything is wrong with it; NULL: nothing is. */
+/* Lets a call fail with an error message, unless that is NULL. */
 static int check(call *this, string wrong) {
     if (wrong == NULL) return 1;
     this->status = FMI_ERROR;
@@ -92,7 +92,7 @@ static void choose_messages(call *this, int logging, size_t n, const string cate
 
 /* States */
 
-/* The locked entry of a state; NULL: there is none, and the call fails. */
+/* Returns the locked entry of a state; if there is none, lets the call fail and returns NULL. */
 static entry *lock_state(call *this, void *state) {
     string wrong;
     entry *it = lock_entry(state, STATE, &wrong);
@@ -105,15 +105,15 @@ static void free_state_of(instance *owner, entry *it) {
     free_entry(it);
 }
 
-/* Whether there is a place for a state; `before` is the one that is there, locked, or NULL. */
+/* Checks the place for a state; `before` is the present state in it, locked, or NULL. */
 static int check_place(call *this, void **state, entry **before) {
     *before = NULL;
     if (!check(this, wrong_place(state))) return 0;
     return *state == NULL || (*before = lock_state(this, *state)) != NULL;
 }
 
-/* Hands a state over to the host, replacing one that it already had; NULL: it could not be made,
- * for want of memory if the call has not been refused. */
+/* Passes a new state to the host in place of a former one; if it is NULL, lets the call fail for
+ * lack of memory, unless the call has been refused. */
 static void hand_over(call *this, void *made, void **state, entry *before) {
     if (before != NULL && made != NULL) {
         free_saved(this->instance, before->thing);
@@ -174,11 +174,11 @@ static void free_handles(call *this) {
 
 /* Instances */
 
-/* A handle of a new instance; NULL, with a message that says why, if anything is wrong.
+/* Returns the handle of a new instance; NULL, after logging the reason, if that is impossible.
  *
- * wrong: what is, with arguments that only the version knows; NULL: nothing.
- * token_is, token: what the version calls the FMU's token, and what the host takes it for; NULL and
- *     "" go with any FMU. */
+ * wrong: error message about arguments of only this version, or NULL.
+ * token_is, token: name of the FMU's token in this version, and the host's token; NULL and "" match
+ *     any FMU. */
 static void *instantiate(string function, string wrong, string name, string token_is, string token,
                          string location, int visible, logger host, int logging) {
     message why;
@@ -199,7 +199,7 @@ static void *instantiate(string function, string wrong, string name, string toke
     return handle;
 }
 
-/* Frees an instance and its states; ignores anything that is not a live instance. */
+/* Frees an instance and its states; ignores other handles. */
 static void free_instance(void *handle, string function) {
     if (handle == NULL) return;
     call this = begin(handle, function, MASK_FreeInstance);

@@ -1,33 +1,33 @@
-/* The component: what the equations and ports of a model need to be an FMU.
+/* The component: the code between the equations and ports of a model and the functions of FMI.
  *
- * fmi2.c and fmi3.c are written over this, each one translation unit: they define NAMED,
- * FIRST_REFERENCE, `version` and call_logger, and include this file. A function of FMI is then
+ * fmi2.c and fmi3.c include this file, each in one translation unit, and define NAMED,
+ * FIRST_REFERENCE, `version` and call_logger. A function of FMI is then
  *
  *     FUNCTION(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
  *
- * guard.c      an instance, what it logs, and refusals
+ * guard.c      instances, their messages, and refusals
  * noise.c      Python's random numbers
- * store.c      values of ports, and what may be done with them
+ * store.c      getting and setting values of ports
  * run.c        modes and steps
- * state.c      the state as bytes, and what is checked before one is taken
+ * state.c      the state as bytes, and the checks before it is restored
  *
- * docs/reference/fmi-answers.md says how each call is answered.
+ * docs/reference/fmi-answers.md lists the answers to all calls.
  */
 #include "equations.c"
 #include "identity.h"
 
 typedef enum { REAL, INTEGER, BOOLEAN, ENUMERATION } fmi_type;
 
-/* What a version calls things. */
+/* Names in a version of FMI. */
 typedef struct {
-    string types[ENUMERATION + 1]; /* of values */
-    int enumerations_are_integers; /* whether they are passed as such */
-    string token;                  /* what tells an FMU from others */
+    string types[ENUMERATION + 1]; /* types of values */
+    int enumerations_are_integers; /* true if functions for Integers pass them */
+    string token;                  /* name of the GUID or token */
 } names;
 
 static const names version;
 
-/* Different messages that an instance logs: a host may step on after a refusal for ever. */
+/* Limit for messages of an instance, without repeated ones: a host may continue after refusals. */
 enum { MOST_MESSAGES = 100 };
 
 /* Ports */
@@ -46,22 +46,22 @@ typedef struct {
     fmi_type type;
     causality causality;
     variability variability;
-    size_t place; /* of the value among inputs or outputs, or of a parameter in its structure */
-    double start, minimum, maximum; /* as numbers that stand for them */
+    size_t place; /* index among inputs or outputs, or offset of a parameter in its structure */
+    double start, minimum, maximum; /* as doubles for all types */
     const choice *choices;
     size_t n_choices;
 } port;
 
-/* Numbers of the state that are alike, one after the other. */
+/* Consecutive numbers of the state with the same type. */
 typedef struct {
     fmi_type type;
     size_t n;
-    string name;           /* of an enumeration; NULL: they are of none */
-    const choice *members; /* of it */
+    string name;           /* name of an enumeration; NULL for other types */
+    const choice *members; /* its members */
     size_t n_members;
 } numbers;
 
-/* An array of n elements, where C has none without elements. */
+/* The size of an array of n elements; C has no empty arrays. */
 #define AT_LEAST_ONE(n) ((n) > 0 ? (n) : 1)
 
 typedef struct {
@@ -69,7 +69,7 @@ typedef struct {
     double h_max; /* largest internal step [s] */
 } parameter_values;
 
-/* All numbers lie side by side as doubles, in which integers are exact. */
+/* All numbers are consecutive doubles, in which integers are exact. */
 
 typedef union {
     model_inputs groups;
@@ -90,28 +90,28 @@ typedef union {
 
 /* A run */
 
-/* Of outputs. Those that are outdated are computed when they are read. A sampled component holds
- * those of the beginning of a step after it; the next step computes its own. */
+/* Freshness of outputs. OUTDATED ones are computed when they are read. A sampled component keeps
+ * the outputs of the beginning of a step, which are then HELD; the next step computes its own. */
 typedef enum { OUTDATED, HELD, FRESH } freshness;
 
 /* A communication point. */
 typedef struct {
     double time;
     state_values state;
-    double draws[AT_LEAST_ONE(MODEL_DRAWS)]; /* that the noise is made of */
+    double draws[AT_LEAST_ONE(MODEL_DRAWS)]; /* random numbers for the noise */
     freshness outputs_are;
 } moment;
 
 /* Everything that the rest of a run depends on. */
 typedef struct {
     mode mode;
-    double start_time, stop_time; /* infinite: there is none */
+    double start_time, stop_time; /* stop_time is infinite if there is none */
     parameter_values parameters; /* as they were set */
     input_values inputs;
-    int begun;         /* whether there is a state */
-    moment moments[2]; /* one is now; the other takes the next, which may be refused */
+    int begun;         /* true if there is a state */
+    moment moments[2]; /* the present one, and room for the next, which may be refused */
     int now;
-    output_values outputs[2]; /* one is shown; the other takes what is computed */
+    output_values outputs[2]; /* those that are shown, and room for new ones */
     int shown;
     generator noise;
     int fault;
@@ -121,15 +121,15 @@ struct instance {
     listener host;
     int in_error;
     run run;
-    parameter_values meant; /* the parameters that steps are taken with */
+    parameter_values meant; /* parameters in use */
     double longest_step;
     model_derived derived;
-    int underived; /* whether it is to be derived again before it is used */
-    int stale;     /* whether a value has changed that the state at the start time depends on */
+    int underived; /* true if `derived` must be computed before it is used */
+    int stale;     /* true if a value has changed that the initial state depends on */
     size_t n_logged;
     uint64_t logged[MOST_MESSAGES];
     state_values restarted; /* for the outputs of a state that is not credible */
-    /* What a call sets, until all of it is found good. */
+    /* Values that a call sets, until all are checked. */
     parameter_values set_parameters;
     input_values set_inputs;
 };
@@ -144,7 +144,7 @@ struct instance {
 #include "run.c"
 #include "state.c"
 
-/* Functions of FMI take more than a component has to know. */
+/* Functions of FMI have arguments that components do not use. */
 #if defined(__GNUC__)
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 #endif

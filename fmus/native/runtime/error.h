@@ -1,4 +1,4 @@
-/* The first error of a call, and why there is one. */
+/* The first error of a call, and its reason. */
 #ifndef ERROR_H
 #define ERROR_H
 
@@ -11,7 +11,7 @@ typedef struct {
     message why; /* the exception's class and text, or only the text of a refusal */
 } Error;
 
-/* Notes an error; the format is one of `compose`. */
+/* Notes an error, unless there is one; the format is as for `compose`. */
 static void raise_error(Error *error, string format, ...) {
     va_list arguments;
     if (error->raised) return;

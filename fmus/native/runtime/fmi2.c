@@ -1,4 +1,4 @@
-/* The functions of FMI 2.0, and the one file to compile: it includes all others. */
+/* The functions of FMI 2.0, and the file to compile: it includes all others. */
 #include "platform.h"
 
 #include "fmi2.h"
@@ -9,7 +9,7 @@
 #define NAMED(name) name
 #endif
 
-/* Value references are places among the variables. */
+/* Value references are indices of the variables. */
 enum { FIRST_REFERENCE = 0 };
 
 #include "component.c"
@@ -20,7 +20,7 @@ static const names version = {
     .token = "GUID",
 };
 
-/* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
+/* In FMI 2.0 a message is a format string, so each % is doubled. */
 static void call_logger(const logger *host, string name, int status, string category, string text) {
     char format[2 * MOST_TEXT + 1];
     copy_doubled(format, text, '%');

@@ -1,4 +1,4 @@
-/* What FMI 2.0 is made of, for both kinds of component. */
+/* Types of FMI 2.0, for both kinds of component. */
 #ifndef FMI2_H
 #define FMI2_H
 
@@ -11,7 +11,7 @@ enum { LAST_SUCCESSFUL_TIME = 2 };
 
 typedef void (*fmi2_logger)(void *, string, int, string, string, ...);
 
-/* fmi2CallbackFunctions, of which only the logger is used. */
+/* fmi2CallbackFunctions; only the logger is used. */
 typedef struct {
     fmi2_logger logger;
     void *(*allocate)(size_t, size_t);

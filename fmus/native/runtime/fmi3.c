@@ -1,7 +1,7 @@
-/* The functions of FMI 3.0, and the one file to compile: it includes all others.
+/* The functions of FMI 3.0, and the file to compile: it includes all others.
  *
- * What co-simulation without events, clocks and derivatives does not need is not supported,
- * and answered with fmi3Error.
+ * Functions that co-simulation without events, clocks and derivatives does not need return
+ * fmi3Error.
  */
 #include "platform.h"
 
@@ -13,7 +13,7 @@
 #define NAMED(name) name
 #endif
 
-/* Value references are places among the variables, from 1: some hosts take them for indices. */
+/* Value references are indices of the variables, from 1, since some hosts use them as such. */
 enum { FIRST_REFERENCE = 1 };
 
 #include "component.c"
@@ -23,7 +23,7 @@ static const names version = {
     .token = "instantiation token",
 };
 
-/* fmi3Boolean and fmi3Clock. A host may pass any byte, where a bool is 0 or 1. */
+/* fmi3Boolean and fmi3Clock. A host may pass any byte, although a bool is 0 or 1. */
 typedef uint8_t boolean;
 
 /* The variable for the time comes after all others. */
@@ -33,14 +33,14 @@ enum { TIME = FIRST_REFERENCE + N_PORTS };
 
 typedef void (*fmi3_logger)(void *environment, int status, string category, string text);
 
-/* A # stands before the reference of a variable, unless it is doubled. */
+/* In FMI 3.0 a # marks the reference of a variable, so each # is doubled. */
 static void call_logger(const logger *host, string name, int status, string category, string text) {
     char doubled[2 * MOST_TEXT + 1];
     copy_doubled(doubled, text, '#');
     ((fmi3_logger)host->function)(host->environment, status, category, doubled);
 }
 
-/* Turns the named categories on or off, and leaves the others as they are; no names: all. */
+/* Turns the named categories, or all without names, on or off; the others are unchanged. */
 static void switch_categories(call *this, int on, size_t n, const string names[]) {
     enum { ALL = sizeof CATEGORIES / sizeof *CATEGORIES };
     string chosen[ALL];
@@ -156,7 +156,7 @@ SET(fmi3SetInt32, int32_t, SET_EACH(INTEGER, v[k]))
 SET(fmi3SetBoolean, boolean, SET_EACH(BOOLEAN, v[k] != 0))
 SET(fmi3SetInt64, int64_t, SET_EACH(ENUMERATION, v[k]))
 
-/* Types that no variable has: every reference is a wrong one, for which 0 is given. */
+/* Types that no variable has: all references are invalid, and values are 0. */
 
 #define GIVE(nothing)                                                                            \
     for (size_t i = 0; i < n_v; i++) v[i] = nothing
@@ -213,7 +213,7 @@ FUNCTION(fmi3DeserializeFMUState, MASK_FMUstate, NULL,
          (void *c, const uint8_t bytes[], size_t size, void **state),
          deserialise_state(&this, bytes, size, state))
 
-/* What is not supported */
+/* Unsupported functions */
 
 #define UNSUPPORTED(name, ...)                                                                   \
     FUNCTION(name, MASK_NotSupported, NULL, (__VA_ARGS__), refuse_unsupported(&this, FMI_ERROR))

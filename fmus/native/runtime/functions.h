@@ -1,10 +1,10 @@
-/* The functions of FMI 2.0 for both kinds of component. Those that are called with an instance:
+/* The functions of FMI 2.0 for both kinds of component. Functions of an instance are defined by
  *
  *     FUNCTION(name, allowed, wrong, parameters, action)
  *     FORWARDED(name, allowed, wrong, parameters, arguments, action)
  *
- * Components in C do the action of both. For those in Python the loader does that of the first, and
- * forwards the second with these arguments to PythonFMU.
+ * The C kind performs the action of both. For the Python kind the loader performs the action of
+ * FUNCTION, and forwards FORWARDED with these arguments to PythonFMU.
  */
 
 EXPORT string NAMED(fmi2GetTypesPlatform)(void) { return "default"; }
@@ -52,7 +52,7 @@ SET(fmi2SetReal, double, wrong_values(n, r, v),
 SET(fmi2SetInteger, int, wrong_values(n, r, v), SET_EACH(INTEGER, v[k]))
 SET(fmi2SetBoolean, int, wrong_values(n, r, v), SET_EACH(BOOLEAN, v[k] != 0))
 
-/* No variable is a text. */
+/* No variable is a String. */
 FORWARDED(fmi2GetString, MASK_Get, wrong_values(n, r, v),
           (void *c, const uint32_t r[], size_t n, string v[]), (c, r, n, v),
           for (size_t i = 0; i < n; i++) v[i] = "";
@@ -73,7 +73,7 @@ FUNCTION(fmi2DeSerializeFMUstate, MASK_FMUstate, NULL,
          (void *c, const char bytes[], size_t size, void **state),
          deserialise_state(&this, bytes, size, state))
 
-/* What is not supported, or hardly */
+/* Unsupported functions */
 
 FORWARDED(fmi2GetDirectionalDerivative, MASK_NotSupported, NULL,
           (void *c, const uint32_t u[], size_t nu, const uint32_t k[], size_t nk,
@@ -94,14 +94,14 @@ STATUS(fmi2GetStatus, int, FMI_ERROR)
 STATUS(fmi2GetIntegerStatus, int, FMI_DISCARD)
 STATUS(fmi2GetStringStatus, string, FMI_DISCARD)
 
-/* No answer: with "true", which is PythonFMU's after each refused step, hosts would end the run as
- * a success; with "false" FMPy would repeat the step without end. */
+/* Returns fmi2Discard: with "true", which PythonFMU returns after each refused step, hosts would
+ * end the run as a success; with "false" FMPy would repeat the step endlessly. */
 FUNCTION(fmi2GetBooleanStatus, MASK_Get, wrong_place(v), (void *c, int kind, int *v), {
     *v = 0;
     this.status = FMI_DISCARD;
 })
 
-/* Only model exchange has these: some hosts look for them in every FMU. */
+/* Functions of model exchange, which some hosts look for in every FMU. */
 
 #define OF_MODEL_EXCHANGE(name, ...)                                                             \
     FUNCTION(name, MASK_NotSupported, NULL, (__VA_ARGS__), refuse_unsupported(&this, FMI_ERROR))

@@ -1,4 +1,4 @@
-/* An instance, what it logs, and refusals. */
+/* Instances, their messages, and refusals. */
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,7 +17,7 @@ static uint64_t hash(string text) {
     return sum;
 }
 
-/* Logs a message only the first time that its key, or else its text, occurs. */
+/* Logs a message, only the first time that its key, or else its text, occurs. */
 static void log_once(instance *it, message *text, int status, string key) {
     uint64_t sum = hash(key != NULL ? key : text->text);
     for (size_t i = 0; i < it->n_logged; i++) {
@@ -64,10 +64,10 @@ static int end(call *this) {
 
 /* Instances */
 
-/* Makes everything what it is after instantiation. */
+/* Resets everything to the values after instantiation. */
 static void renew(instance *it);
 
-/* Where a GUID begins and how long it is, without braces. */
+/* Moves to the beginning of a GUID after braces, and returns its length without them. */
 static size_t without_braces(string *token) {
     *token += strspn(*token, "{}");
     size_t length = strlen(*token);
@@ -79,7 +79,7 @@ static int lower(char letter) {
     return letter >= 'A' && letter <= 'Z' ? letter - 'A' + 'a' : letter;
 }
 
-/* Whether two tokens are the same except the case of their letters. */
+/* Compares two tokens, ignoring braces and case. */
 static int same_token(string one, string other) {
     size_t length = without_braces(&one);
     if (without_braces(&other) != length) return 0;

@@ -1,19 +1,18 @@
-/* Tells what is alive from what is not.
+/* Handles of live instances and states.
  *
- * The host gets numbers for instances and states, no addresses: a number is given once in the life
- * of a process, so that what was freed, what belongs to another FMU, and what is none are told from
- * what is alive, without looking where a wrong address points to. (Where a pointer has 32 bits, a
- * number comes again after some thousand.)
+ * The host gets numbers for instances and states, not addresses. A number is used once in the life
+ * of a process, so that handles that are invalid, freed or from another FMU are recognised without
+ * reading from an invalid address. (With pointers of 32 bits, numbers repeat after some thousand.)
  *
- * A call locks the entry of its instance, or state, from its beginning to its end. Entries stay
- * where they are, so that they can be looked up while others come and go.
+ * A call locks the entry of its instance, or state, from its beginning to its end. Entries are
+ * never moved, so that they can be looked up while others are added and removed.
  */
 #include <stdlib.h>
 
-/* Of the runtime: lets other threads go on for a moment. */
+/* Defined by the runtime: lets other threads continue for a moment. */
 static void give_way(void);
 
-/* The lower bits of a handle are its place among the entries, the others the serial number. */
+/* The lower bits of a handle are the index of its entry, the others a serial number. */
 enum { PLACE_BITS = 20, CHUNK_BITS = 10 };
 
 #define CHUNK_SIZE ((size_t)1 << CHUNK_BITS)
@@ -23,19 +22,19 @@ typedef enum { INSTANCE, STATE } thing_kind;
 
 struct entry {
     shared handle; /* NULL: free */
-    shared thread; /* that has locked it; NULL: none */
+    shared thread; /* thread that has locked it; NULL: none */
     size_t place;
     thing_kind kind;
     void *thing;
-    entry *owner, *states;  /* of a state; of an instance */
+    entry *owner, *states;  /* for a state; for an instance */
     entry *next, *previous; /* states of the same owner; free entries */
 };
 
-/* Most processes need no more than the first chunk. Place 0 holds nothing: no handle is NULL. */
+/* Most processes need only the first chunk. Index 0 is not used, so that no handle is NULL. */
 static entry first_chunk[CHUNK_SIZE];
 static shared chunks[MOST_ENTRIES >> CHUNK_BITS];
 
-/* The thread that changes what follows, and the links of entries; NULL: none. */
+/* The thread that has locked the following variables and the links of entries; NULL: none. */
 static shared table_thread;
 static entry *free_entries;
 static size_t n_entries;
@@ -47,17 +46,17 @@ static void lock_table(void) {
 
 static void unlock_table(void) { put_shared(&table_thread, NULL); }
 
-/* Another number for each address. */
+/* Returns a different number for each address. */
 static uint64_t mixed(uint64_t number) {
     number = (number ^ number >> 30) * 0xbf58476d1ce4e5b9u;
     number = (number ^ number >> 27) * 0x94d049bb133111ebu;
     return number ^ number >> 31;
 }
 
-/* Makes room for one more entry. */
+/* Adds an unused entry. */
 static int grow(void) {
     if (n_entries == 0) {
-        /* Each FMU, and each copy of one in the process, begins elsewhere. */
+        /* Each FMU, and each copy of one in the process, begins with another number. */
         serial = mixed((uintptr_t)first_chunk);
         put_shared(&chunks[0], first_chunk);
         n_entries = 1;
@@ -93,7 +92,7 @@ static void unlink_from_owner(entry *it) {
     }
 }
 
-/* NULL if there is no memory for another one. */
+/* Returns a new handle, or NULL if there is no memory. */
 static void *new_handle(thing_kind kind, void *thing, entry *owner) {
     void *handle = NULL;
     lock_table();
@@ -117,8 +116,8 @@ static int is_alive(entry *it, void *handle) {
 
 static void unlock_entry(entry *it) { put_shared(&it->thread, NULL); }
 
-/* The entry of a handle, which no other thread has locked; NULL, and what is wrong: there is none,
- * or this thread is in a call of it already. */
+/* Locks and returns the entry of a handle; NULL, and an error message, if there is none or this
+ * thread has locked it already. */
 static entry *lock_entry(void *handle, thing_kind kind, string *wrong) {
     size_t place = (uintptr_t)handle & (MOST_ENTRIES - 1);
     entry *chunk = get_shared(&chunks[place >> CHUNK_BITS]);
@@ -157,7 +156,7 @@ static void free_entry(entry *it) {
     unlock_entry(it);
 }
 
-/* The handle of some state of an instance; NULL: it has none. */
+/* Returns the handle of a state of an instance, or NULL if there is no state. */
 static void *state_of(const entry *owner) {
     lock_table();
     void *handle = owner->states == NULL ? NULL : get_shared(&owner->states->handle);

@@ -1,20 +1,20 @@
-/* The host's arguments and its logger. Errors are logged even where logging is off, as FMI 2.0.4
- * and 3.0.3 have it. */
+/* The host's arguments and its logger. Errors are logged even if logging is off, as required by
+ * FMI 2.0.4 and 3.0.3. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* Arguments: what is wrong with them; NULL: nothing. */
+/* Checks of arguments, which return an error message or NULL. */
 
-/* Whether a text is not there, or has nothing but white space. */
+/* True if a text is NULL or only white space. */
 static int is_blank(string text) {
     return text == NULL || text[strspn(text, " \t\n\v\f\r")] == '\0';
 }
 
-/* More values in one call than any FMU has. */
+/* Limit for the number of values in a call. */
 enum { MOST_VALUES = 1 << 20 };
 
-/* More bytes than any state has. */
+/* Limit for the size of a state. */
 enum { MOST_BYTES = 1 << 30 };
 
 static string wrong_size(size_t n, const void *array) {
@@ -49,7 +49,7 @@ static string wrong_bytes(const void *bytes, size_t size) {
     return size == 0 || size > MOST_BYTES ? "no state has that size" : NULL;
 }
 
-/* What speaks against an instance; `wrong` is what the version found, NULL: nothing. */
+/* Checks the arguments for a new instance; `wrong` is an error of the version's checks, or NULL. */
 static int check_instance(string wrong, string name, string token_is, string token, message *why) {
     if (is_blank(name)) return compose(why, "the instance has no name");
     if (!is_utf8(name)) return compose(why, "the name of the instance is not UTF-8");
@@ -59,10 +59,10 @@ static int check_instance(string wrong, string name, string token_is, string tok
 
 /* Logging */
 
-/* Of the version: calls the logger, which is not NULL. */
+/* Defined for each version of FMI: calls the logger, which is not NULL. */
 static void call_logger(const logger *host, string name, int status, string category, string text);
 
-/* By the statuses of messages. */
+/* Categories by status. */
 static const string CATEGORIES[] = {"logAll", "logStatusWarning", "logStatusDiscard",
                                     "logStatusError", "logStatusFatal"};
 
@@ -71,7 +71,7 @@ static char *copied(string text) {
     return copy == NULL ? NULL : strcpy(copy, text);
 }
 
-/* Begins to listen; a name that is none is given as a question mark. */
+/* Initialises a listener; an invalid name becomes a question mark. */
 static int listen(listener *it, string name, logger host, int logging) {
     *it = (listener){.host = host, .logging = logging};
     it->name = copied(name != NULL && is_utf8(name) ? name : "?");
@@ -90,7 +90,7 @@ static void release_listener(listener *it) {
     free(it->name);
 }
 
-/* Takes note of what the host wants to hear; no categories: all. 0: no memory. */
+/* Sets the wanted categories, or all if there are none; returns 0 if there is no memory. */
 static int choose_categories(listener *it, int logging, size_t n, const string categories[]) {
     release_categories(it);
     it->logging = logging;
@@ -113,7 +113,7 @@ static int is_wanted(const listener *it, int status, string category) {
     return 0;
 }
 
-/* A text, in which a character that stands for more than itself is doubled, in room for that. */
+/* Copies a text, and doubles a special character; `room` must be large enough. */
 static void copy_doubled(char *room, string text, char special) {
     for (; *text != '\0'; text++) {
         if (*text == special) *room++ = *text;
@@ -122,7 +122,7 @@ static void copy_doubled(char *room, string text, char special) {
     *room = '\0';
 }
 
-/* Logs a message, whether it is wanted or not. */
+/* Logs a message, even if its category is not wanted. */
 static void log_to_host(const listener *it, int status, string category, string text) {
     if (it->host.function == NULL) {
         fprintf(stderr, "%s: %s: %s\n", it->name, category, text);

@@ -1,19 +1,20 @@
-/* What both kinds of component share: the runtime of those in C, and the loader of those in Python.
+/* Code that both kinds of component share: the runtime of the C kind, and the loader of the Python
+ * kind.
  *
- * text.c      texts of messages, and which bytes are text
+ * text.c      messages, UTF-8
  * host.c      the host's arguments and its logger
- * handles.c   tells what is alive from what is not
- * calls.c     what every call begins with, instances, and the host's states
+ * handles.c   handles of live instances and states
+ * calls.c     the beginning of every call, instances, and the host's states
  * functions.h the functions of FMI 2.0
  *
- * Names use a few verbs in one sense, as fmus/python/component.py does:
+ * Some verbs always have the same meaning, also in fmus/python/component.py:
  *
- * check    whether something is good; writes or gives the reason if it is not
+ * check    test something, and write or return the reason if it is invalid
  * refuse   answer a call with another status than OK, and log the reason
  * fail     refuse with an error, after which the instance is in FMI's error state
- * log      hand a message to the host's logger
+ * log      pass a message to the host's logger
  *
- * A function that can fail writes a reason into `why`, and gives 0.
+ * A function that can fail writes a reason into `why`, and returns 0.
  */
 #ifndef HOST_H
 #define HOST_H
@@ -26,10 +27,10 @@ typedef const char *string;
 /* fmi2Status and fmi3Status. */
 enum { FMI_OK, FMI_WARNING, FMI_DISCARD, FMI_ERROR, FMI_FATAL };
 
-/* Modes of an instance, and those in which a function may be called; in any other it is an error.
+/* Modes of an instance, and the modes in which each function is allowed; in others it is an error.
  *
- * docs/reference/fmi-answers.md has every call in every mode, and says why more is allowed here
- * than in the standards. The last one, FMI's state error, may be had in each of the others. */
+ * docs/reference/fmi-answers.md lists every call in every mode, and explains why more is allowed
+ * here than in the standards. AFTER_ERROR, FMI's error state, occurs in each of the others. */
 typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED, AFTER_ERROR } mode;
 
 #define WHEN(mode) (1 << (mode))
@@ -45,36 +46,36 @@ typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED, AFTER_ERROR } m
 #define MASK_Terminate NOT_AFTER_ERROR
 #define MASK_Reset ALWAYS
 #define MASK_FreeInstance ALWAYS
-#define MASK_Get ALWAYS /* values, and what is known of a step */
+#define MASK_Get ALWAYS /* values, and the status of a step */
 #define MASK_Set BEFORE_THE_END
 #define MASK_FMUstate ALWAYS     /* all functions about states */
-#define MASK_NotSupported ALWAYS /* all others */
+#define MASK_NotSupported ALWAYS /* all other functions */
 
-/* The host's logger, as the version of FMI casts it, and what it is called with. */
+/* The host's logger, cast to a common type, and its argument. */
 typedef struct {
     void (*function)(void);
     void *environment;
 } logger;
 
-/* What an instance logs. */
+/* The logger of an instance, and its settings. */
 typedef struct {
     logger host;
     char *name;
     int logging;
     size_t n;
-    char **categories; /* that are wanted; none: all */
+    char **categories; /* wanted categories; none: all */
 } listener;
 
 typedef struct instance instance;
 typedef struct entry entry;
 
-/* A call between its beginning and its end. */
+/* A call in progress. */
 typedef struct {
-    instance *instance; /* NULL: the handle belongs to no live instance */
-    entry *entry;       /* of the instance, which the call has locked */
+    instance *instance; /* NULL: the handle is not a live instance */
+    entry *entry;       /* entry of the instance, locked by the call */
     string function;
-    int allowed; /* the modes that it may come in */
-    int status;  /* what the call is answered with */
+    int allowed; /* modes in which it is allowed */
+    int status;  /* status that it returns */
 } call;
 
 #endif

@@ -13,7 +13,7 @@
 enum { GENERATOR_WORDS = 624, SHIFT = 397, PAIR = 4 /* words of two normal numbers */ };
 
 typedef struct {
-    uint32_t place; /* of the next word; GENERATOR_WORDS: all are used up */
+    uint32_t place; /* index of the next word; GENERATOR_WORDS: all are used */
     int has_next;
     double next; /* normal numbers come in pairs */
     uint32_t words[GENERATOR_WORDS];
@@ -39,8 +39,8 @@ static void seed_generator(generator *it, uint32_t seed) {
     it->next = 0.0;
 }
 
-/* Copies what drawing n normal numbers may change: two words each, one pair ahead. The words
- * themselves change only once all are used up. */
+/* Copies what drawing n normal numbers may change. Each takes two words, in pairs. The words
+ * themselves change only when all are used. */
 static inline void copy_for(generator *copy, const generator *it, uint32_t n) {
     copy->place = it->place;
     copy->has_next = it->has_next;
@@ -68,7 +68,7 @@ static uint32_t tempered(uint32_t x) {
     return x ^ x >> 18;
 }
 
-/* Uniform in [0, 1), with 53 bits of two words. */
+/* Returns a number uniform in [0, 1), with 53 bits from two words. */
 static double uniform(const uint32_t x[]) {
     uint32_t upper = tempered(x[0]) >> 5, lower = tempered(x[1]) >> 6;
     return (upper * 67108864.0 + lower) * (1.0 / 9007199254740992.0);
@@ -93,7 +93,7 @@ static double standard_normal(generator *it) {
         it->next = sin(angle) * radius;
         it->has_next = 1;
     }
-    /* Python gives mean + z * deviation: it has no negative zero. */
+    /* Python returns mean + z * deviation, which is never a negative zero. */
     return 0.0 + z;
 }
 

@@ -1,11 +1,11 @@
-/* What C99 lacks: words that threads share, threads, functions that a library offers. */
+/* Features that C99 lacks: atomic words, threads, exported functions. */
 #ifndef PLATFORM_H
 #define PLATFORM_H
 
 #if defined(_WIN32)
 #define EXPORT __declspec(dllexport)
 #else
-/* Before any header: what strict C99 hides of POSIX. */
+/* Before any header: POSIX functions that strict C99 hides. */
 #ifndef _POSIX_C_SOURCE
 #define _POSIX_C_SOURCE 200809L
 #endif
@@ -14,8 +14,8 @@
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* The name of a function: where a prefix for it is defined, as the standards have it, several FMUs
- * can be linked into one program. */
+/* The name of a function; with prefixes, as in the standards, several FMUs can be linked into one
+ * program. */
 #define PASTE(prefix, name) prefix##name
 #define PREFIXED(prefix, name) PASTE(prefix, name)
 
@@ -26,8 +26,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-/* A word that several threads read and write. What a thread wrote before it put a word is seen by
- * one that got it. */
+/* A word that several threads read and write, with release and acquire semantics. */
 typedef void *volatile shared;
 
 #if defined(_MSC_VER)
@@ -40,7 +39,7 @@ static inline void put_shared(shared *word, void *value) {
     (void)_InterlockedExchangePointer(word, value);
 }
 
-/* Whether the word was `before`, and is `after` now. */
+/* Changes the word from `before` to `after`; false if it was not `before`. */
 static inline int swap_shared(shared *word, void *before, void *after) {
     return _InterlockedCompareExchangePointer(word, after, before) == before;
 }
@@ -53,7 +52,7 @@ static inline void put_shared(shared *word, void *value) {
     __atomic_store_n(word, value, __ATOMIC_RELEASE);
 }
 
-/* Whether the word was `before`, and is `after` now. */
+/* Changes the word from `before` to `after`; false if it was not `before`. */
 static inline int swap_shared(shared *word, void *before, void *after) {
     return __atomic_compare_exchange_n(word, &before, after, 0, __ATOMIC_ACQUIRE,
                                        __ATOMIC_RELAXED);
@@ -63,21 +62,21 @@ static inline int swap_shared(shared *word, void *before, void *after) {
 
 #if defined(_WIN32)
 
-/* windows.h would bring thousands of names. */
+/* windows.h would define thousands of names. */
 __declspec(dllimport) unsigned long __stdcall GetCurrentThreadId(void);
 __declspec(dllimport) void __stdcall Sleep(unsigned long milliseconds);
 
-/* What tells this thread from the others; never NULL. */
+/* Identifies this thread; never NULL. */
 static inline void *this_thread(void) { return (void *)(uintptr_t)GetCurrentThreadId(); }
 
 static inline void wait_a_moment(void) { Sleep(1); }
 
 #else
 
-/* What tells this thread from the others; never NULL. */
+/* Identifies this thread; never NULL. */
 static inline void *this_thread(void) { return (void *)pthread_self(); }
 
-/* It sleeps: a thread of high priority that only yields would never let the other one finish. */
+/* Sleeps: a thread of high priority that only yields would never let another one finish. */
 static inline void wait_a_moment(void) {
     static const struct timespec moment = {0, 20000};
     nanosleep(&moment, NULL);

@@ -1,15 +1,15 @@
 /* Modes and steps.
  *
- * A step is a transaction: it computes the next moment, which is taken when all of it was found
- * finite. The outputs of a moment are computed when they are read; at the end of a step at once, if
- * no input changes them, so that it is the step that is refused. A sampled component computes those
- * of the beginning of a step, and keeps them.
+ * A step is a transaction: it computes the next moment, which becomes the present one if all its
+ * values are finite. Outputs are computed when they are read; if no input changes them, they are
+ * computed at the end of a step, so that an error refuses the step. A sampled component computes
+ * the outputs of the beginning of a step, and keeps them.
  */
 #include <float.h>
 #include <math.h>
 #include <string.h>
 
-/* Makes a run what it is after instantiation. */
+/* Resets a run to the values after instantiation. */
 static void renew_run(run *it) {
     memset(it, 0, sizeof *it);
     it->stop_time = INFINITY;
@@ -47,7 +47,7 @@ static int is_bounded(const state_values *state) {
     return sum <= LARGEST_STATE * LARGEST_STATE;
 }
 
-/* Whether a number of the state is one that its enumeration has, if it is of one. */
+/* Checks that a number of the state is a member of its enumeration, if it has one. */
 static int check_member(const numbers *of, double number, message *why) {
     return of->name == NULL || text_among(of->members, of->n_members, number) != NULL ||
            compose(why, "%.0f is not of type %s", number, of->name);
@@ -62,7 +62,7 @@ static int check_members(const double values[], message *why) {
     return 1;
 }
 
-/* Whether a state that was computed is one that a run can go on from. */
+/* Checks a computed state. */
 static int check_computed(const state_values *state, const Error *error, message *why) {
     if (error->raised) return compose(why, "%s", error->why.text);
     return check_members(state->values, why) &&
@@ -74,14 +74,14 @@ static void draw(generator *noise, double draws[]) {
     for (int i = 0; i < MODEL_DRAWS; i++) draws[i] = standard_normal(noise);
 }
 
-/* Derives of a state what hooks need, unless nothing that it is made of has changed. */
+/* Computes the derived values, unless nothing that they depend on has changed. */
 static void derive(instance *it, const model_state *state, double time, Error *error) {
     if (!it->underived) return;
     model_derive(&it->meant.model, state, &it->run.inputs.groups, time, &it->derived, error);
     it->underived = error->raised;
 }
 
-/* Computes the outputs of a moment, which are not shown yet. */
+/* Computes the outputs of a moment, without showing them. */
 static int evaluate(instance *it, const moment *of, message *why) {
     output_values *outputs = &it->run.outputs[!it->run.shown];
     const model_parameters *parameters = &it->meant.model;
@@ -111,7 +111,7 @@ static int evaluate(instance *it, const moment *of, message *why) {
 
 /* Initialisation and end */
 
-/* State and outputs at the start time. */
+/* Computes the state and the outputs at the start time. */
 static int start(instance *it, message *why) {
     run *run = &it->run;
     moment *next = &run->moments[!run->now];
@@ -151,7 +151,7 @@ static int refresh(instance *it, message *why) {
     return compose(why, "initialisation refused: %s", said.text);
 }
 
-/* A stop time that is not after the start stands for none. */
+/* Sets the times; a stop time that is not after the start means that there is none. */
 static void set_experiment(call *this, double start, double stop) {
     run *run = &this->instance->run;
     message why;
@@ -182,7 +182,7 @@ static void terminate(call *this) { this->instance->run.mode = TERMINATED; }
 
 /* Steps */
 
-/* The number of internal steps that a step is split into; -1: it is refused. */
+/* Returns the number of internal steps; -1 if the step is refused. */
 static int internal_steps(double time, double step, double longest, message *why) {
     if (!isfinite(time) || !isfinite(step)) {
         compose(why, "time %r and step %r must be finite", time, step);
@@ -198,13 +198,13 @@ static int internal_steps(double time, double step, double longest, message *why
     return -1;
 }
 
-/* The end of a step: that of a host that counts them, where its beginning is. */
+/* Returns the end of a step: a multiple of the step, if its beginning is one. */
 static double end_of_step(double start, double time, double step) {
     double k = nearbyint((time - start) / step);
     return time == start + k * step ? start + (k + 1.0) * step : time + step;
 }
 
-/* Computes the next moment, and makes it now if all of it is good. */
+/* Computes the next moment, and makes it the present one if all its values are valid. */
 static int advance(instance *it, double time, double step, message *why) {
     run *run = &it->run;
     moment *next = &run->moments[!run->now];
@@ -267,13 +267,13 @@ static int advance(instance *it, double time, double step, message *why) {
     return 1;
 }
 
-/* Where the run is: at the end of the last step that was taken. */
+/* Returns the end of the last successful step. */
 static double time_of(const call *this) {
     const run *run = &this->instance->run;
     return run->moments[run->now].time;
 }
 
-/* Whether a step ends beyond the stop time, which a host that adds its steps up reaches nearly. */
+/* True if a step ends after the stop time, except for rounding errors of a host that adds steps. */
 static int ends_too_late(double end, double start, double stop) {
     return end > stop && end > stop + ROUNDING * fmax(fabs(start), fabs(stop));
 }

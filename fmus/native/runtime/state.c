@@ -1,12 +1,12 @@
-/* The state of an FMU: complete, exact, as bytes, and checked before it is taken.
+/* The state of an FMU: complete, exact, as bytes, and checked before it is restored.
  *
- * It is held in memory as the bytes that it is serialised to:
+ * It is kept in memory as the bytes that it is serialised to:
  *
  *     MAGIC, identity, mode, start time, stop time, time,
- *     parameters in the order of their ports, inputs, Reals before others,
- *     whether there is a state, and if so: the numbers of the state; of the noise the words of the
- *     generator, the place of the next, whether there is a next number, and it, and what is drawn;
- *     of a sampled component the outputs, Reals before others, and what they are;
+ *     parameters in the order of their ports, inputs, Reals first,
+ *     1 if there is a state, else 0; if there is one: the numbers of the state; for noise the words
+ *     of the generator, the index of the next word, 1 if there is a next number, that number, and
+ *     the last draw; for a sampled component the outputs, Reals first, and their freshness;
  *     fault;
  *     the CRC-32 of all that.
  *
@@ -19,25 +19,25 @@
 
 static const char MAGIC[] = "FMU state 3";
 
-/* Tells states of one model and version from all others. */
+/* Identifies states of this model and version. */
 static const char IDENTITY[] = MODEL_NAME " " MODEL_GUID;
 
-/* No normal number that is drawn is larger: it is made of 53 bits. */
+/* Bound of normal random numbers, which are made from 53 bits. */
 static const double LARGEST_DRAW = 9.0;
 
 enum { WORD_SIZE = 4, CHECKSUM_SIZE = WORD_SIZE };
 
 typedef struct {
     size_t size;
-    int sealed; /* whether the checksum stands where it belongs: it is computed when it is needed */
+    int sealed; /* true once the checksum is written, which is when it is needed */
     unsigned char bytes[1];
 } saved;
 
-/* Bytes that are written or read, in one order for both: each function passes a value, and gives
- * it back, or the one that is read; 0 where the bytes have come to their end. */
+/* Bytes to write or read, in the same order: each function takes a value, and returns it after
+ * writing, or returns the value that was read, which is 0 after the end of the bytes. */
 typedef struct {
-    unsigned char *bytes; /* NULL: they are only counted */
-    size_t place, size;   /* of the next; of all that can be read */
+    unsigned char *bytes; /* NULL: only count them */
+    size_t place, size;   /* index of the next byte; number of readable bytes */
     int reads;
 } tape;
 
@@ -75,7 +75,7 @@ static void pass_values(tape *it, double values[], size_t reals, size_t n) {
     pass_numbers(it, INTEGER, values + reals, n - reals);
 }
 
-/* Gives whether the text is the one that is read. */
+/* Writes a text, or returns true if it is read. */
 static int pass_text(tape *it, string text) {
     size_t n = strlen(text), begin = it->place + WORD_SIZE;
     if (pass_word(it, (uint32_t)n) != n) return 0;
@@ -121,7 +121,7 @@ static void pass_run(tape *tape, run *it) {
     it->fault = (int)pass_word(tape, (uint32_t)it->fault);
 }
 
-/* Writes a run, and gives how many bytes it takes with its checksum; NULL: it is only counted. */
+/* Writes a run, and returns the size with the checksum; with NULL it only counts. */
 static size_t write_run(unsigned char *bytes, run *it) {
     tape to = {.bytes = bytes};
     pass_text(&to, MAGIC);
@@ -131,7 +131,7 @@ static size_t write_run(unsigned char *bytes, run *it) {
 }
 
 static uint32_t crc32(const unsigned char *bytes, size_t n) {
-    /* Of the half bytes 0 to 15. */
+    /* Checksums of the half bytes 0 to 15. */
     static const uint32_t sums[] = {
         0x00000000, 0x1db71064, 0x3b6e20c8, 0x26d930ac, 0x76dc4190, 0x6b6b51f4,
         0x4db26158, 0x5005713c, 0xedb88320, 0xf00f9344, 0xd6d6a3e8, 0xcb61b38c,
@@ -162,11 +162,11 @@ static int has_its_checksum(saved *state) {
     return pass_word(&from, 0) == sum;
 }
 
-/* What is read */
+/* Checks */
 
 static int is_truth(double number) { return number == 0.0 || number == 1.0; }
 
-/* Whether a number can be a port's; an output is in no range, as no step looks at one. */
+/* Checks a value of a port; ranges of outputs do not matter, since no step depends on an output. */
 static int check_value(const port *port, double number, message *why) {
     if (port->type == BOOLEAN && !is_truth(number)) {
         return compose(why, "%s: must be a Boolean", port->name);
@@ -183,7 +183,7 @@ static int check_values(const double values[], size_t n, const uint32_t referenc
     return 1;
 }
 
-/* Whether a number can be one of the state. */
+/* Checks a number of the state. */
 static int check_number(const numbers *of, double number, message *why) {
     if (of->type == REAL) return isfinite(number) || compose(why, "a value is not finite");
     if (of->type == BOOLEAN && !is_truth(number)) {
@@ -212,7 +212,7 @@ static int check_noise(const generator *noise, const double draws[], message *wh
     return good || compose(why, "its noise is none that can be drawn");
 }
 
-/* Whether all that was read of a run can be one's. */
+/* Checks all values of a run that was read. */
 static int check_run(const run *it, message *why) {
     const moment *now = &it->moments[it->now];
     const uint32_t mode = (uint32_t)it->mode;
@@ -253,7 +253,7 @@ static int check_run(const run *it, message *why) {
     return is_truth(it->fault) || compose(why, "its fault is neither true nor false");
 }
 
-/* Whether a run can have led to a state, whose numbers are finite. */
+/* Checks that a run can have led to a state, whose numbers are finite. */
 static int check_reachable(const run *it, message *why) {
     const model_parameters *parameters = &it->parameters.model;
     const state_values *state = &it->moments[it->now].state;
@@ -264,7 +264,7 @@ static int check_reachable(const run *it, message *why) {
     return !error.raised || compose(why, "%s", error.why.text);
 }
 
-/* How many bytes a state has at most; `it` is a new run. */
+/* Returns the largest size of a state; `it` is a new run. */
 static size_t largest_size(run *it) {
     it->begun = 1;
     size_t size = write_run(NULL, it);
@@ -272,7 +272,7 @@ static size_t largest_size(run *it) {
     return size;
 }
 
-/* Makes a new run what was saved. */
+/* Reads a saved state into a new run, and checks it. */
 static int take_saved(saved *state, run *it, message *why) {
     tape from = {state->bytes, 0, content_size(state), 1};
     if (!pass_text(&from, MAGIC)) return compose(why, "the bytes are not a state");
@@ -299,21 +299,21 @@ static int restore(instance *it, saved *state, message *why) {
     if (good) {
         it->run = *wanted;
         it->stale = 0;
-        /* Before the first step all follows from parameters and inputs: it is computed again. */
+        /* Before the first step the state follows from parameters and inputs, and is recomputed. */
         note_change(it, 0, 0);
     }
     free(wanted);
     return good;
 }
 
-/* What the host does with states */
+/* Functions for the host's states */
 
 static void free_saved(instance *it, void *saved) {
     (void)it;
     free(saved);
 }
 
-/* A state with room for some bytes; NULL: no memory. */
+/* Allocates a state of a size; NULL if there is no memory. */
 static saved *new_saved(size_t size) {
     saved *made = malloc(sizeof *made + size);
     if (made != NULL) *made = (saved){.size = size};

@@ -1,36 +1,36 @@
-/* Values of ports, and what may be done with them.
+/* Getting and setting values of ports.
  *
- * A port's value reference tells its place in the table. All Real inputs and all Real outputs lie
- * side by side, in their order and before the others, so that a host that passes them all in one
- * call costs one comparison.
+ * The value reference of a port gives its index in the table. Real inputs and Real outputs are
+ * stored first, in the order of their references, so that a call that passes all of them takes one
+ * comparison of the references.
  */
 #include <math.h>
 #include <string.h>
 
-/* Lets parameters act from the next step, if they fit together. */
+/* Uses parameters from the next step on, if they do not contradict each other. */
 static int adopt(instance *it, const parameter_values *values, message *why);
 
-/* Computes the outputs, and before them the state at the start time if a value has changed that it
- * depends on. */
+/* Computes the outputs, and before that the initial state if a value that it depends on has
+ * changed. */
 static int refresh(instance *it, message *why);
 
 /* Ports */
 
 static const char NO_PORT[] = "no %s has the value reference %u";
 
-/* The port that has a value reference; NULL: none. */
+/* Returns the port with a value reference, or NULL. */
 static const port *port_at(uint32_t reference) {
     uint32_t place = reference - FIRST_REFERENCE;
     return place < N_PORTS ? &ports[place] : NULL;
 }
 
-/* Whether a port is passed by the calls for a type. */
+/* True if functions for a type pass the values of a port. */
 static int passes_as(const port *port, fmi_type type) {
     return port->type == type || (type == INTEGER && port->type == ENUMERATION &&
                                   version.enumerations_are_integers);
 }
 
-/* The text of a number among n; NULL: it is none of them. */
+/* Returns the text of a number among n choices, or NULL. */
 static string text_among(const choice choices[], size_t n, double number) {
     for (size_t i = 0; i < n; i++) {
         if (choices[i].number == number) return choices[i].text;
@@ -42,7 +42,7 @@ static int check_finite(const port *port, double number, message *why) {
     return isfinite(number) || compose(why, "%s = %r: must be finite", port->name, number);
 }
 
-/* Whether a port can take a number. */
+/* Checks that a port can take a number. */
 static int check_range(const port *port, double number, message *why) {
     if (!check_finite(port, number, why)) return 0;
     if (port->n_choices > 0 && text_among(port->choices, port->n_choices, number) == NULL) {
@@ -63,7 +63,7 @@ static int check_range(const port *port, double number, message *why) {
     return 0;
 }
 
-/* A parameter. */
+/* Returns the value of a parameter. */
 static double parameter(const parameter_values *values, const port *port) {
     const char *place = (const char *)values + port->place;
     double real;
@@ -88,7 +88,7 @@ static void put_parameter(parameter_values *values, const port *port, double num
 
 /* Getting */
 
-/* References for a type that no port has; `type` is the version's name of it. */
+/* Refuses references for a type that no port has; `type` is its name in this version. */
 static void get_unknown(call *this, string type, const uint32_t references[], size_t n) {
     message why;
     for (size_t i = 0; i < n; i++) {
@@ -97,10 +97,10 @@ static void get_unknown(call *this, string type, const uint32_t references[], si
     }
 }
 
-/* The output that no group has. */
+/* `fault` is the output that is not in the equations' groups. */
 static int is_fault(const port *port) { return port == &ports[N_PORTS - 1]; }
 
-/* The value of a port as a number; 0.0, if no port of the type has the reference. */
+/* Returns the value of a port as a double; 0.0 if no port of the type has the reference. */
 static double number_of(call *this, uint32_t reference, fmi_type type) {
     const run *run = &this->instance->run;
     const port *port = port_at(reference);
@@ -114,7 +114,7 @@ static double number_of(call *this, uint32_t reference, fmi_type type) {
     return run->outputs[run->shown].values[port->place];
 }
 
-/* Whether references name all inputs, or outputs, in their order. */
+/* True if references name all inputs, or all outputs, in order. */
 static int are_all(const uint32_t references[], const uint32_t all[], size_t n) {
     return n > 0 && memcmp(references, all, n * sizeof *all) == 0;
 }
@@ -127,7 +127,7 @@ static int has_output(const uint32_t references[], size_t n) {
     return 0;
 }
 
-/* Before values are got: outputs are made what they are. */
+/* Before getting values: brings outputs up to date. */
 static void prepare_to_get(call *this, const uint32_t references[], size_t n) {
     instance *it = this->instance;
     message why;
@@ -135,7 +135,7 @@ static void prepare_to_get(call *this, const uint32_t references[], size_t n) {
     if (has_output(references, n) && !refresh(it, &why)) refuse(this, FMI_ERROR, &why, NULL);
 }
 
-/* Whether references are those of all Real outputs, whose values are then got at once. */
+/* Gets all Real outputs at once if the references name them; otherwise returns false. */
 static int get_all_reals(call *this, const uint32_t references[], size_t n, double values[]) {
     const run *run = &this->instance->run;
     if (n != REAL_OUTPUTS || !are_all(references, output_references, n)) return 0;
@@ -143,7 +143,7 @@ static int get_all_reals(call *this, const uint32_t references[], size_t n, doub
     return 1;
 }
 
-/* All values can be got as Reals. */
+/* Functions for Reals get values of all types. */
 static double get_real(call *this, uint32_t reference) {
     return number_of(this, reference, REAL);
 }
@@ -158,7 +158,7 @@ static int get_boolean(call *this, uint32_t reference) {
 
 /* Setting */
 
-/* Inputs or parameters of the run have changed: what depends on them has to follow. */
+/* Marks the values that depend on inputs or parameters, which have changed, as outdated. */
 static void note_change(instance *it, int inputs, int parameters) {
     moment *now = &it->run.moments[it->run.now];
     if (it->run.mode == INITIALISING) {
@@ -171,8 +171,8 @@ static void note_change(instance *it, int inputs, int parameters) {
     }
 }
 
-/* The values of a call, which the instance keeps until all of them are found good: all are taken,
- * or none. They are set one by one between the beginning and the end of a setting. */
+/* The values of a call, which the instance keeps until all are checked: all are accepted, or none.
+ * They are set one by one between the beginning and the end of a setting. */
 typedef struct {
     call *call;
     int good;
@@ -208,7 +208,7 @@ static int is_settled(const run *run, const port *port) {
     return port->variability == FIXED && run->mode == STEPPING;
 }
 
-/* Whether the standard lets a port be set to any value now; a host may tell a fixed one again. */
+/* Checks that the standard allows setting a port now; a fixed one may be set to its own value. */
 static int check_settable(const run *run, const port *port, double number, message *why) {
     if (port->causality == OUTPUT) {
         return compose(why, "%s is an output and cannot be set", port->name);
@@ -217,7 +217,7 @@ static int check_settable(const run *run, const port *port, double number, messa
            compose(why, "%s is fixed and cannot change after initialisation", port->name);
 }
 
-/* A run with another parameter than the host asked for must not begin. */
+/* A run must not begin with another parameter than the host wanted. */
 static void refuse_setting(setting *it, message *why) {
     it->good = 0;
     if (it->has_parameters && it->call->instance->run.mode != STEPPING) {
@@ -271,7 +271,7 @@ static int all_finite(const double values[], size_t n) {
     return 1;
 }
 
-/* Whether references are those of all Real inputs, whose values are then set at once. */
+/* Sets all Real inputs at once if the references name them; otherwise returns false. */
 static int set_all_reals(call *this, const uint32_t references[], size_t n, const double values[]) {
     run *run = &this->instance->run;
     if (n != REAL_INPUTS || INPUTS_HAVE_RANGES || run->mode != STEPPING ||
@@ -283,10 +283,10 @@ static int set_all_reals(call *this, const uint32_t references[], size_t n, cons
     return 1;
 }
 
-/* References and values of a call, one by one */
+/* Loops over the references and values of a call */
 
-/* How many values a reference stands for: that of a scalar, or those of an array, whose reference
- * is that of its first element. */
+/* Returns the number of values of a reference: 1 for a scalar, or the elements of an array, which
+ * has the reference of its first element. */
 static size_t span(uint32_t reference) {
 #ifdef ARRAYS
     uint32_t place = reference - FIRST_REFERENCE;

@@ -1,4 +1,4 @@
-/* Texts of messages: UTF-8, of bounded length, with numbers as Python writes them in any locale. */
+/* Messages: UTF-8 of bounded length, with numbers as in Python, independent of the locale. */
 #ifndef TEXT_C
 #define TEXT_C
 
@@ -14,7 +14,7 @@
 
 /* UTF-8 */
 
-/* The number of bytes of the character that a text begins with; 0: it is none. */
+/* Returns the number of bytes of the first character of a text; 0 if it is not UTF-8. */
 static int length_of_character(const char *text) {
     static const uint32_t smallest[] = {0, 0, 0x80, 0x800, 0x10000};
     const unsigned char *bytes = (const unsigned char *)text;
@@ -44,7 +44,7 @@ static int is_utf8(const char *text) {
 
 /* Messages */
 
-/* Some hosts have a buffer of 1 or 2 kB for a message. No character has more than four bytes. */
+/* Some hosts have buffers of 1 or 2 kB for messages. A character has at most four bytes. */
 enum { MOST_CHARACTERS = 500, MOST_TEXT = 4 * MOST_CHARACTERS };
 
 typedef struct {
@@ -53,7 +53,7 @@ typedef struct {
     char text[MOST_TEXT + 1];
 } message;
 
-/* Adds some bytes as far as it has room: whole characters, if they are UTF-8. */
+/* Appends bytes up to the limit; UTF-8 is cut after a whole character. */
 static void append_bytes(message *it, string bytes, size_t n) {
     string end = bytes + n;
     while (bytes < end && it->characters < MOST_CHARACTERS && it->length < MOST_TEXT) {
@@ -75,7 +75,7 @@ static void clear(message *it) {
 
 /* Numbers */
 
-/* Digits that tell any number from all others, and exponents beyond which Python writes one. */
+/* Digits that identify a double, and the range of numbers that Python writes without exponent. */
 enum { ALL_DIGITS = 17, SMALLEST_EXPONENT = -4, LARGEST_EXPONENT = 15 };
 
 /* A number as 0.digits * 10^point. */
@@ -88,7 +88,7 @@ static decimal rounded(double magnitude, int n) {
     decimal it = {.point = 1};
     char text[ALL_DIGITS + 16], *next = text, *end = it.digits;
     snprintf(text, sizeof text, "%.*e", n - 1, magnitude);
-    /* Between the digits is what the locale puts there. */
+    /* Skip the decimal point, which depends on the locale. */
     for (; *next != 'e'; next++) {
         if (isdigit((unsigned char)*next)) *end++ = *next;
     }
@@ -114,11 +114,11 @@ static decimal next_above(decimal it) {
     return it;
 }
 
-/* The fewest digits that read back as the number. */
+/* Returns the shortest digits that read back as the number. */
 static decimal shortest(double magnitude) {
     int exponent;
-    /* Below a power of two numbers lie closer than above it: the nearest digits may be too far
-     * below it, and those above near enough. */
+    /* Below a power of two, numbers are closer together than above it: the nearest digits may be
+     * too far below it, while the next digits above are near enough. */
     int power_of_two = frexp(magnitude, &exponent) == 0.5;
     for (int n = 1;; n++) {
         decimal it = rounded(magnitude, n);
@@ -128,7 +128,7 @@ static decimal shortest(double magnitude) {
     }
 }
 
-/* A number as Python's repr shows it. */
+/* Appends a number as Python's repr shows it. */
 static void append_exactly(message *it, double number) {
     char text[ALL_DIGITS + 16] = "", *end = text;
     if (isnan(number) || isinf(number)) {
@@ -143,7 +143,7 @@ static void append_exactly(message *it, double number) {
         snprintf(end, sizeof text - 1, "%c%s%.*se%c%02d", said.digits[0], n > 1 ? "." : "", n - 1,
                  said.digits + 1, exponent < 0 ? '-' : '+', abs(exponent));
     } else {
-        /* The digit i stands for units if i is the exponent. */
+        /* The digit i is the units digit if i is the exponent. */
         for (int i = exponent < 0 ? exponent : 0; i < n || i <= exponent; i++) {
             *end++ = i < 0 || i >= n ? '0' : said.digits[i];
             if (i == exponent && i + 1 < n) *end++ = '.';
@@ -153,7 +153,7 @@ static void append_exactly(message *it, double number) {
     append_text(it, text);
 }
 
-/* A number as a directive of printf writes it. Python's NaN has no sign. */
+/* Appends a number in a format of printf. NaN has no sign, as in Python. */
 static void append_number(message *it, string directive, double number) {
     char text[MOST_TEXT + 1], *end = text;
     snprintf(text, sizeof text, directive, isnan(number) ? fabs(number) : number);
@@ -161,7 +161,7 @@ static void append_number(message *it, string directive, double number) {
         if (strchr("+- ", *next) != NULL || isalnum((unsigned char)*next)) {
             *end++ = *next;
         } else if (end[-1] != '.') {
-            /* Between the digits is what the locale puts there. */
+            /* Replace the decimal point, which depends on the locale. */
             *end++ = '.';
         }
     }
@@ -169,12 +169,12 @@ static void append_number(message *it, string directive, double number) {
     append_text(it, text);
 }
 
-/* What a directive may have between its % and its letter, and how long it is with both. */
+/* Characters between the % and the letter of a directive, and its longest length. */
 static const char MODIFIERS[] = "+ .0123456789";
 enum { LONGEST_DIRECTIVE = 16 };
 
-/* Writes a text: %s is a text; %r a number exactly; %d an integer; %u a reference; %% a percent
- * sign; all else a number as printf writes it, such as %g or %+.2f. */
+/* Writes a message: %s is a text, %r a double exactly, %d an integer, %u a reference, %% a percent
+ * sign; other directives, such as %g or %+.2f, format a double as printf does. */
 static void compose_from(message *it, string format, va_list arguments) {
     clear(it);
     while (*format != '\0') {
@@ -205,7 +205,7 @@ static void compose_from(message *it, string format, va_list arguments) {
     }
 }
 
-/* The same; gives 0, with which a function fails. */
+/* Writes a message, and returns 0, so that a function that fails can return the result. */
 static int compose(message *it, string format, ...) {
     va_list arguments;
     va_start(arguments, format);

@@ -15,7 +15,7 @@
 
 #pragma GCC diagnostic ignored "-Wunused-parameter"
 
-/* What PythonFMU answers to one of its functions, and its slave to that call. */
+/* Calls a function of PythonFMU, and takes the statuses of PythonFMU and of the slave. */
 #define FORWARD(call, name, parameters, arguments)                                               \
     do {                                                                                         \
         static int(*forward) parameters;                                                         \
@@ -24,14 +24,14 @@
         take_answer(call);                                                                       \
     } while (0)
 
-/* After a call: steps have come to a time, unless the slave has told another. */
+/* Sets the last successful time after a call, unless the slave has logged another. */
 static void come_to(call *this, double time) {
     instance *it = this->instance;
     if (this->status != FMI_OK) return;
     it->last_successful_time = isnan(it->time_told) ? time : it->time_told;
 }
 
-/* After a call that an instance has recovered by. */
+/* Leaves the error state after a successful call. */
 static void recover(call *this, double time) {
     if (this->status == FMI_OK) this->instance->in_error = 0;
     come_to(this, time);
@@ -54,7 +54,7 @@ FUNCTION(fmi2DoStep, MASK_DoStep, NULL, (void *c, double time, double step, int 
                  (this.instance->slave, time, step, no_set));
          come_to(&this, time + step))
 
-/* PythonFMU's time is also that of a step that was refused, and of the run before a reset. */
+/* PythonFMU also returns times of refused steps, and of the run before a reset. */
 FUNCTION(fmi2GetRealStatus, MASK_Get, wrong_place(v), (void *c, int kind, double *v), {
     if (kind == LAST_SUCCESSFUL_TIME) {
         *v = this.instance->last_successful_time;
@@ -84,7 +84,7 @@ static size_t size_of_saved(call *this, void *saved) {
     return size;
 }
 
-/* PythonFMU copies as many bytes as it is told, however many there are. */
+/* PythonFMU copies `size` bytes without checking how many there are. */
 static void write_saved(call *this, void *saved, void *bytes, size_t size) {
     FORWARD(this, fmi2SerializeFMUstate, (void *, void *, char *, size_t),
             (this->instance->slave, saved, bytes, size));

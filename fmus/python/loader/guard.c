@@ -1,7 +1,7 @@
-/* The instance that the host holds, its messages, and the ends of every call.
+/* The host's instance, its messages, and the beginning and end of every call.
  *
- * A call holds the global interpreter lock and its instance. It gives the interpreter lock back
- * first, then logs, then lets the next call of the instance begin.
+ * A call locks the interpreter and its instance. It releases the interpreter first, then logs, then
+ * lets the next call of the instance begin.
  */
 #include <math.h>
 #include <stdio.h>
@@ -10,8 +10,8 @@
 
 /* Messages */
 
-/* Notes a message for the end of the call. Percent signs of a format are doubled; those of slaves
- * that log plain texts are not. What is not UTF-8 gets question marks. */
+/* Keeps a message for the end of the call. In a format string percent signs are doubled; slaves may
+ * also log plain texts. Bytes of invalid UTF-8 become question marks. */
 static void queue_message(instance *it, int status, string category, string text, int is_format) {
     int valid = is_utf8(text);
     queued **place = &it->queue, *made;
@@ -45,7 +45,7 @@ static void log_queue(instance *it) {
     }
 }
 
-/* FMI 2.0 defines a message as a format: a host would take a % for a directive. */
+/* In FMI 2.0 a message is a format string, so each % is doubled. */
 static void call_logger(const logger *host, string name, int status, string category, string text) {
     char *format = malloc(2 * strlen(text) + 1);
     if (format == NULL) return;
@@ -54,9 +54,9 @@ static void call_logger(const logger *host, string name, int status, string cate
     free(format);
 }
 
-/* The logger that PythonFMU gets. An entry of the category "answer" is no message: with it the
- * slave says what PythonFMU cannot, the status of the call, and as the digits of a double's bits
- * the time that it has come to, if that does not follow from the arguments. */
+/* The logger for PythonFMU. An entry of the category "answer" is not a message: it passes the
+ * status of the call, which PythonFMU cannot return, and, as hexadecimal digits of a double's bits,
+ * the present time, if that does not follow from the arguments. */
 static void log_of_slave(void *environment, string name, int status, string category, string text,
                          ...) {
     instance *it = environment;
@@ -82,12 +82,12 @@ static int hex(char digit) {
     return digit >= 'a' && digit <= 'f' ? digit - 'a' + 10 : -1;
 }
 
-/* PythonFMU takes the path once more for a URI: it would read another folder. */
+/* PythonFMU decodes the path as a URI again, and would read another folder. */
 static int is_read_otherwise(string path) {
     return strstr(path, "%20") != NULL || strstr(path, "file://") != NULL;
 }
 
-/* file:///a%20b or file:/a%20b as the plain path /a b, which PythonFMU takes as it is. */
+/* Turns file:///a%20b or file:/a%20b into the plain path /a b, which PythonFMU accepts. */
 static int plain_path(string uri, char **path, message *why) {
     char *end = *path = malloc(strlen(uri) + 1);
     if (end == NULL) return compose(why, "out of memory");
@@ -121,8 +121,8 @@ static void *new_slave(instance *it, string guid, string path, int visible, mess
     typedef void *(*instantiate)(string, int, string, string, const callbacks *, int, int);
     instantiate forward = (instantiate)pythonfmu_function("fmi2Instantiate");
     void *slave = forward(it->host.name, CO_SIMULATION, guid, path, &it->heard, visible, 1);
-    /* PythonFMU's watch over an interpreter that it has not started: it would free it twice when
-     * the process ends. */
+    /* Free PythonFMU's guard of the interpreter, which PythonFMU did not start, and would free
+     * twice at the end of the process. */
     ((void (*)(void))pythonfmu_function("finalizePythonInterpreter"))();
     if (take_exception(why) && slave != NULL) {
         free_slave(slave);
@@ -171,12 +171,12 @@ static void release_instance(instance *it) {
 
 /* Calls */
 
-/* A host that ends Python first lets its instances go after that: there is nothing left to end. */
+/* True for functions that a host may call after it has ended Python; they then do nothing. */
 static int is_an_end(string function) {
     return strcmp(function, "fmi2Terminate") == 0 || strcmp(function, "fmi2FreeInstance") == 0;
 }
 
-/* Begins a call with the interpreter lock, if Python runs: before that there is no instance. */
+/* Begins a call, with the interpreter locked if Python runs: without it there is no instance. */
 static call begin(void *handle, string function, int allowed) {
     call this = {.function = function, .status = is_an_end(function) ? FMI_OK : FMI_ERROR};
     int lock = 0, has_lock = pythonfmu != NULL;
@@ -197,25 +197,24 @@ static call begin(void *handle, string function, int allowed) {
     return this;
 }
 
-/* The slave knows its mode. */
+/* The slave checks the mode itself. */
 static int check_mode(call *this) {
     (void)this;
     return 1;
 }
 
-/* Takes on the status that the slave has for a call, where PythonFMU has answered fmi2OK. */
+/* Takes the status that the slave logged for a call, for which PythonFMU returns fmi2OK. */
 static void take_answer(call *this) {
     instance *it = this->instance;
     if (it->answer > this->status) this->status = it->answer;
     if (it->answer >= FMI_ERROR && !(this->allowed & WHEN(AFTER_ERROR))) it->in_error = 1;
 }
 
-/* Gives the interpreter lock back, and logs what there is to log. */
+/* Releases the interpreter lock, and logs the messages of the call. */
 static void leave(call *this) {
     instance *it = this->instance;
     message why;
-    /* PythonFMU leaves an exception where it does not look for one; a Python host would stumble
-     * over it later. */
+    /* PythonFMU ignores some exceptions and leaves them set, where a Python host finds them. */
     if (take_exception(&why) && this->status < FMI_ERROR) check(this, why.text);
     if (this->status == FMI_FATAL && !it->is_lost) {
         it->is_lost = 1;

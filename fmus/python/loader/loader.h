@@ -1,8 +1,8 @@
-/* What the parts of the loader know of each other. fmi2.c is compiled, and includes all others.
+/* Shared declarations of the loader. fmi2.c is compiled, and includes all other files.
  *
- * python.c  finds Python and starts it, once a process; has preflight.py find out whether PythonFMU
+ * python.c  finds and starts Python, once a process; runs preflight.py, which checks that PythonFMU
  *           can make an instance
- * guard.c   the instance that the host holds, its messages, and the ends of every call
+ * guard.c   the host's instance, its messages, and the beginning and end of every call
  * fmi2.c    the functions of FMI 2.0
  */
 #ifndef LOADER_H
@@ -15,7 +15,7 @@
 
 /* Python */
 
-/* Of its functions those that are used here, under their own names. */
+/* The functions of Python that are used, under their own names. */
 #define PYTHON_FUNCTIONS(F)                                                                      \
     F(int, Py_IsInitialized, (void))                                                             \
     F(void, PyPreConfig_InitIsolatedConfig, (void *))                                            \
@@ -53,7 +53,7 @@ static struct {
 
 /* The instance */
 
-/* A message that the host gets at the end of the call. */
+/* A message that is passed to the host at the end of the call. */
 typedef struct queued queued;
 struct queued {
     queued *next;
@@ -66,14 +66,14 @@ struct instance {
     listener host;
     queued *queue;
     int has_logged_error;
-    callbacks heard; /* what PythonFMU gets for callbacks */
+    callbacks heard; /* callbacks for PythonFMU */
     void *slave;     /* PythonFMU's own instance */
-    int lock;        /* what the call got with the global interpreter lock */
-    int answer;      /* the status that the slave has for the call */
-    double time_told; /* by the slave in the call, NaN: none */
+    int lock;        /* result of PyGILState_Ensure in this call */
+    int answer;      /* status that the slave logged for the call */
+    double time_told; /* time that the slave logged in the call, NaN: none */
     double last_successful_time;
     int in_error;
-    int is_lost; /* after fmi2Fatal: PythonFMU may have freed parts of it */
+    int is_lost; /* set after fmi2Fatal: PythonFMU may have freed parts of it */
 };
 
 #endif

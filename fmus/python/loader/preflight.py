@@ -1,7 +1,7 @@
-"""Whether PythonFMU can make an instance from a folder of resources.
+"""Check that PythonFMU can make an instance from a folder of resources.
 
-PythonFMU 0.7 ends the process where the folder lacks the slave. The loader runs this text, which is
-compiled into it, before it forwards fmi2Instantiate. It must need only Python 3.9.
+PythonFMU 0.7 ends the process if the folder lacks the slave. The loader contains the text of this
+module, and runs it before it forwards fmi2Instantiate. It may use only Python 3.9.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import NamedTuple
 
-#: Attribute of a script's module: the text that it was made from, once that was found good.
+#: Attribute of a script's module: its text, once that was checked.
 _TEXT = "__checked_text__"
 
 
 class _Sound(NamedTuple):
-    """A folder from which an instance can be made."""
+    """A folder that was checked."""
 
     script: str
     guid: str
-    #: What this rests on, and what these files looked like.
+    #: The files that were checked, and their stamps.
     files: list[str]
     stamps: list[tuple[int, int, int]]
 
@@ -33,11 +33,11 @@ _sound: dict[str, _Sound] = {}
 
 
 def refusal(resources: str, guid: str) -> str:
-    """What speaks against an instance; empty: nothing.
+    """Return the reason why no instance can be made, or an empty text.
 
     Args:
         resources: path of the folder.
-        guid: what the host takes the FMU's GUID for; empty: it does not say.
+        guid: GUID that the host passes, or an empty text.
 
     """
     try:
@@ -49,7 +49,7 @@ def refusal(resources: str, guid: str) -> str:
 
 
 def forget(resources: str) -> None:
-    """Take a folder off sys.path."""
+    """Remove a folder from sys.path."""
     with suppress(ValueError):
         sys.path.remove(resources)
 
@@ -63,7 +63,7 @@ def _check(resources: str, guid: str) -> None:
 
 
 def _stamps(files: list[str]) -> list[tuple[int, int, int]]:
-    """What changes when files do."""
+    """Return numbers of files that differ after a change."""
     found = map(os.stat, files)
     return [(it.st_ino, it.st_size, it.st_mtime_ns) for it in found]
 
@@ -76,11 +76,11 @@ def _examined(resources: str) -> _Sound:
     path, own_guid = Path(resources, f"{script}.py"), Path(resources, "guid.txt")
     files = [str(names), str(path), str(own_guid)]
     stamps, text, guid = _stamps(files), _content(path), _content(own_guid).decode("utf-8")
-    # An import reads what was compiled before, if it is there.
+    # An import reads the cached byte code, if there is any.
     cached = Path(importlib.util.cache_from_source(str(path)))
     if cached.exists() and not cached.is_file():
         raise ValueError(f"{cached} is not a regular file")
-    # It tells what is wrong with a text, where an import may find the bytes of an older one.
+    # Report syntax errors, which an import with older byte code would not find.
     compile(text, path, "exec")
     module = _imported(script, resources)
     if _TEXT not in vars(module) and Path(str(module.__file__)).read_bytes() == text:
@@ -93,7 +93,7 @@ def _examined(resources: str) -> _Sound:
 
 
 def _content(path: Path) -> bytes:
-    """What is in a file; from a pipe or device a read may never come back."""
+    """Read a regular file: reading a pipe or device could block."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     with os.fdopen(descriptor, "rb") as file:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -111,7 +111,7 @@ def _imported(script: str, resources: str) -> ModuleType:
 
 
 def _has_slave(module: ModuleType) -> bool:
-    """Whether there is a class where PythonFMU will look for it."""
+    """Return True if a class is where PythonFMU looks for it."""
     return any(
         isinstance(found, type)
         and (name == "" or any(base.__name__ == "Fmi2Slave" for base in found.__mro__[1:]))

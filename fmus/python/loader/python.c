@@ -1,12 +1,12 @@
-/* Finds Python and starts it, once a process.
+/* Finds and starts Python, once a process.
  *
- * Each FMU has its own loader, and hosts instantiate FMUs from several threads. What all
- * loaders of a process share is one object: the dynamic linker makes symbols of the type
- * gnu_unique_object the same for all libraries, even the ones loaded only for themselves.
+ * Each FMU has its own loader, and hosts instantiate FMUs from several threads. All loaders of a
+ * process share one object: the dynamic linker resolves symbols of the type gnu_unique_object to
+ * the same address in all libraries, even in those loaded with RTLD_LOCAL.
  *
- * The interpreter starts isolated: no variable of the environment changes how it starts, and it
- * takes no signal from the host. A start that fails ends in a reason, not in the end of the
- * process. It is never ended: another FMU may come.
+ * The interpreter starts isolated: environment variables do not affect it, and it handles no signal
+ * of the host. If it cannot start, the reason is logged, and the process continues. It is never
+ * ended, since another FMU may be loaded later.
  */
 #include <dlfcn.h>
 #include <limits.h>
@@ -19,17 +19,17 @@
 enum { NEWEST = 13, OLDEST = 9 };
 
 typedef struct {
-    pthread_mutex_t lock; /* for starting; the interpreter lock is never waited for under it */
+    pthread_mutex_t lock; /* for starting; never held while waiting for the interpreter lock */
     enum { UNTRIED, RUNS, FAILED } python;
-    /* Under the interpreter lock: */
-    int making; /* how many instances a thread makes, one within the other */
+    /* Guarded by the interpreter lock: */
+    int making; /* number of instances that a thread makes, one within the other */
     pthread_t maker;
-    pid_t family; /* the process that it is in: a child that is forked lacks the thread */
+    pid_t family; /* process id: a forked child lacks the thread */
     message why;
 } process_state;
 
-/* The name carries a number, which another layout raises. Defined without C, because clang gives
- * what C defines another binding. Zeros are a lock that is free, and UNTRIED. */
+/* The number in the name changes with the layout. Defined in assembly, because clang gives C
+ * definitions another binding. Zeros mean an unlocked lock and UNTRIED. */
 enum { ROOM = 4096 };
 _Static_assert(sizeof(process_state) <= ROOM, "the state is larger than its room");
 extern __attribute__((visibility("default"))) process_state auv_fmu_process_3;
@@ -45,7 +45,7 @@ static _Atomic(void *) pythonfmu;
 
 static const char ENDED[] = "the host has ended Python";
 
-/* PythonFMU's own library, found while the current folder is that in which this one was. */
+/* Path of PythonFMU's library, found while the loader's path is valid in the current folder. */
 static char companion[PATH_MAX];
 
 __attribute__((constructor)) static void find_companion(void) {
@@ -73,8 +73,8 @@ static int note_libpython(struct dl_phdr_info *info, size_t size, void *path) {
 
 static int find_python(message *why) {
     char path[PATH_MAX] = "";
-    /* A libpython that the host has loaded only for itself is made visible: a second one of
-     * another version in the same process would not do. */
+    /* Make a libpython visible that the host has loaded with RTLD_LOCAL: a second one of another
+     * version cannot run in the same process. */
     if (!has_python() && dl_iterate_phdr(note_libpython, path)) {
         dlopen(path, RTLD_LAZY | RTLD_NOLOAD | RTLD_GLOBAL);
     }
@@ -99,7 +99,7 @@ static int find_python(message *why) {
     return 1;
 }
 
-/* The first fields of PyPreConfig, which are the same from 3.9 to 3.13, and room for more. */
+/* The first fields of PyPreConfig, which are the same from 3.9 to 3.13, and room for others. */
 typedef struct {
     int init, parse_argv, isolated, use_environment, configure_locale;
     int coerce_c_locale, coerce_c_locale_warn, utf8_mode;
@@ -113,7 +113,7 @@ static int succeeded(python_status status) {
 }
 
 static int start(void) {
-    /* Without UTF-8 mode, file names would be taken for ASCII where the host has set no locale. */
+    /* Without UTF-8 mode, file names would be ASCII if the host has not set a locale. */
     preconfiguration before = {0};
     py.PyPreConfig_InitIsolatedConfig(&before);
     before.utf8_mode = 1;
@@ -126,7 +126,7 @@ static int start(void) {
     py.PyConfig_Clear(configuration);
     if (!started) return 0;
 
-    /* Nobody will end this interpreter, and flush what slaves have printed. */
+    /* This interpreter is never ended, so output of slaves must be flushed line by line. */
     py.PyRun_SimpleStringFlags(
         "import sys\nif sys.stdout: sys.stdout.reconfigure(line_buffering=True)\n", NULL);
     py.PyEval_SaveThread();
@@ -153,7 +153,7 @@ static int load_pythonfmu(message *why) {
     return 1;
 }
 
-/* Brings Python and PythonFMU into the process, if they are not. */
+/* Loads Python and PythonFMU into the process, unless they are loaded. */
 static int load(message *why) {
     if (pythonfmu == NULL) {
         pthread_mutex_lock(&process.lock);
@@ -167,14 +167,14 @@ static int load(message *why) {
 
 static void *pythonfmu_function(string name) { return dlsym(pythonfmu, name); }
 
-/* Lets other threads have the interpreter lock for a while. */
+/* Releases the interpreter lock for a moment. */
 static void give_way(void) {
     void *thread = py.PyEval_SaveThread();
     wait_a_moment();
     py.PyEval_RestoreThread(thread);
 }
 
-/* Waits until no other thread makes an instance, of any FMU, which changes sys.path. */
+/* Waits until no other thread makes an instance of any FMU, since that changes sys.path. */
 static void begin_making(void) {
     while (process.making > 0 && process.family == getpid() &&
            !pthread_equal(process.maker, pthread_self())) {
@@ -188,7 +188,7 @@ static void begin_making(void) {
 
 static void end_making(void) { process.making--; }
 
-/* Whether a Python exception is set, in words; it is set no longer. */
+/* Clears a Python exception and returns its message; false if none is set. */
 static int take_exception(message *why) {
     void *type = NULL, *value = NULL, *trace = NULL;
     if (py.PyErr_Occurred() == NULL) return 0;
@@ -204,7 +204,7 @@ static int take_exception(message *why) {
     return 1;
 }
 
-/* preflight.py finds out whether PythonFMU can make an instance: it would end the process. */
+/* preflight.py checks that PythonFMU can make an instance; otherwise PythonFMU ends the process. */
 
 enum { FILE_INPUT = 257 };
 
@@ -214,7 +214,7 @@ __asm__(".pushsection .rodata\n"
         ".byte 0\n"
         ".popsection\n");
 
-/* A function of preflight.py; NULL with an exception set. */
+/* Returns a function of preflight.py, or NULL with an exception set. */
 static void *function(string name) {
     static void *namespace;
     if (namespace == NULL) {
@@ -247,7 +247,7 @@ static int preflight(string resources, string guid, message *why) {
     return good;
 }
 
-/* Takes a resources folder off sys.path, where PythonFMU leaves it. */
+/* Removes a resources folder from sys.path, where PythonFMU leaves it. */
 static void forget(string resources) {
     message unused;
     void *forget = function("forget");

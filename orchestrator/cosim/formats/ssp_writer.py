@@ -34,8 +34,8 @@ from orchestrator.cosim.formats.archive import LEFT_OPEN, OMS, ORDER, OSP, SSC, 
 from orchestrator.cosim.formats.ssp_reader import SystemPath
 from orchestrator.cosim.system import System
 from orchestrator.cosim.variables import Value, Variable
+from orchestrator.machine.disk import file_name, plain_file_names
 from orchestrator.machine.errors import InputError, shortened
-from orchestrator.machine.file_names import file_name, plain_file_names
 from orchestrator.machine.texts import literal
 from orchestrator.machine.user_files import read_archive
 

@@ -1,5 +1,5 @@
-"""The indices of a vehicle, in the language of equations: what each sees of a run, and makes of it.
+"""The indices of a vehicle, in the language of equations.
 
-A module here is one :class:`~fmus.ports.reducer.Reducer`. The names of its inputs are those of the
-standard loop; each loop has its own for them.
+Each module is a :class:`~fmus.ports.reducer.Reducer`. Its inputs have the names of the standard
+loop, which are mapped to the names of each loop.
 """

@@ -1,4 +1,4 @@
-"""What the actuators give: (59), and how much of it is to and fro."""
+"""Effort of the actuators, (59), and its variation."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ROOT = {member: f"{unit}.s^1/2" for member, unit in TAU.items()}
 
 
 class Inputs(NamedTuple):
-    """The applied signal, and which actuators have a lag."""
+    """The applied signal, and the lags of the actuators."""
 
     applied: Annotated[Vector3, Variable(TAU, "What (3) lets through", name="plant.tau_applied")]
     lag: Annotated[
@@ -23,7 +23,7 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all steps so far."""
+    """Sums over all steps so far."""
 
     energy: Vector3  #: integral of the square
     variation: Vector3  #: sum of the absolute differences
@@ -50,15 +50,15 @@ class Outputs(NamedTuple):
 
 
 def start() -> State:
-    """No step yet."""
+    """Begin without a step."""
     none = (0.0, 0.0, 0.0)
     return State(none, none, none, 0)
 
 
 def update(state: State, inputs: Inputs, acting: Inputs, h: float) -> State:
-    """One more step."""
+    """Add a step."""
     lag_u, lag_q, lag_r = inputs.lag
-    # Actuators with a lag have a state: what they give at the end of the step counts.
+    # Actuators with a lag have a state, so the value at the end of the step counts.
     u = acting.applied[0] if lag_u == 0.0 else inputs.applied[0]
     q = acting.applied[1] if lag_q == 0.0 else inputs.applied[1]
     r = acting.applied[2] if lag_r == 0.0 else inputs.applied[2]
@@ -74,7 +74,7 @@ def update(state: State, inputs: Inputs, acting: Inputs, h: float) -> State:
 
 
 def outputs(state: State, t: float, begin: float) -> Outputs:
-    """Roots of the energy, and of its mean."""
+    """Return the roots of the energy and of its mean, and the variation."""
     if state.steps == 0:
         none = (nan, nan, nan)
         return Outputs(none, none, none)

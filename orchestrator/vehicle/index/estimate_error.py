@@ -1,4 +1,4 @@
-"""How good the estimated velocity is."""
+"""Error of the estimated velocity."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all steps so far."""
+    """Sums over the steps of the second half so far."""
 
-    squares: Vector3  #: sums of the squares of what the estimate is wrong by
-    steps: int  #: that they are sums of
-    is_late: bool  #: whether the next step begins in the second half
+    squares: Vector3  #: sums of the squares of the error
+    steps: int  #: number of these steps
+    is_late: bool  #: true if the next step begins in the second half
 
 
 class Outputs(NamedTuple):
@@ -38,19 +38,19 @@ class Outputs(NamedTuple):
 
 
 def is_late(t: float, begin: float, end: float) -> bool:
-    """Whether a time lies in the second half of a run."""
+    """Return True for a time in the second half of a run."""
     return t >= begin + 0.5 * (end - begin)
 
 
 def start(t: float, begin: float, end: float) -> State:
-    """No step yet."""
+    """Begin without a step."""
     return State((0.0, 0.0, 0.0), 0, is_late(t, begin, end))
 
 
 def update(
     state: State, before: Inputs, acting: Inputs, t: float, begin: float, end: float
 ) -> State:
-    """One more step."""
+    """Add a step."""
     if not state.is_late:
         return state._replace(is_late=True) if is_late(t, begin, end) else state
     s_x, s_y, s_z = state.squares
@@ -61,7 +61,7 @@ def update(
 
 
 def outputs(state: State) -> Outputs:
-    """The root of the mean."""
+    """Return the root of the mean."""
     if state.steps == 0:
         return Outputs(nan)
     x, y, z = state.squares

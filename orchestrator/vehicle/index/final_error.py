@@ -1,4 +1,4 @@
-"""How far from its reference the control point is at the end: e_f of section 4.2."""
+"""Tracking error at the end of a run: e_f of section 4.2."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ LAST = 5.0
 
 
 class State(NamedTuple):
-    """Of the rows of these seconds."""
+    """Largest errors of these rows so far."""
 
     largest: Vector3
 
@@ -30,18 +30,18 @@ class Outputs(NamedTuple):
 
 
 def start(inputs: Inputs) -> State:
-    """The first of these rows."""
+    """Begin with the first of these rows."""
     x, y, z = error(inputs)
     return State((abs(x), abs(y), abs(z)))
 
 
 def update(state: State, inputs: Inputs) -> State:
-    """One more row."""
+    """Add a row."""
     l_x, l_y, l_z = state.largest
     x, y, z = error(inputs)
     return State((max(l_x, abs(x)), max(l_y, abs(y)), max(l_z, abs(z))))
 
 
 def outputs(state: State, t: float, begin: float) -> Outputs:
-    """The largest errors; before the first step nothing has been followed."""
+    """Return the largest errors; there are none before the first step."""
     return Outputs(state.largest if t > begin else (nan, nan, nan))

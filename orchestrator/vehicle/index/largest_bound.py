@@ -1,4 +1,4 @@
-"""How much force the robust term may use at any speed: what its chattering follows from."""
+"""Largest force that the robust term may use at any speed, which determines its chattering."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from auv_fmu import Variable
 
 
 class Inputs(NamedTuple):
-    """The part of the bound that is there at any speed."""
+    """The part of the bound that does not depend on the speed."""
 
     rho_hat: Annotated[float, Variable("N", "Its estimate", name="controller.theta_hat[1]")]
 
 
 class State(NamedTuple):
-    """Of all steps so far."""
+    """Largest value of all steps so far."""
 
     largest: float
 
@@ -27,15 +27,15 @@ class Outputs(NamedTuple):
 
 
 def start() -> State:
-    """No step yet."""
+    """Begin without a step."""
     return State(-inf)
 
 
 def update(state: State, acting: Inputs) -> State:
-    """One more step."""
+    """Add a step."""
     return state if acting.rho_hat <= state.largest else State(acting.rho_hat)
 
 
 def outputs(state: State) -> Outputs:
-    """The bound, if there was a step."""
+    """Return the bound, if there was a step."""
     return Outputs(state.largest if state.largest > -inf else nan)

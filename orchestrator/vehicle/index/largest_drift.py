@@ -1,4 +1,4 @@
-"""How fast the vehicle moves where nothing is commanded."""
+"""Largest speed in the directions without actuators."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all rows so far."""
+    """Largest value of all rows so far."""
 
     largest: float
 
@@ -32,22 +32,22 @@ class Outputs(NamedTuple):
 
 
 def speed(inputs: Inputs) -> float:
-    """|(v, w)| [m/s]."""
+    """Return |(v, w)| [m/s]."""
     v, w = inputs.drift
     return sqrt(v * v + w * w)
 
 
 def start(inputs: Inputs) -> State:
-    """The row of the start."""
+    """Begin with the first row."""
     return State(speed(inputs))
 
 
 def update(state: State, inputs: Inputs) -> State:
-    """One more row."""
+    """Add a row."""
     drift = speed(inputs)
     return state if drift <= state.largest else State(drift)
 
 
 def outputs(state: State) -> Outputs:
-    """The speed."""
+    """Return the speed."""
     return Outputs(state.largest)

@@ -1,4 +1,4 @@
-"""How fast the control point moves."""
+"""Largest speed of the control point."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all rows so far."""
+    """Largest value of all rows so far."""
 
     largest: float
 
@@ -28,16 +28,16 @@ class Outputs(NamedTuple):
 
 
 def start(inputs: Inputs) -> State:
-    """The row of the start."""
+    """Begin with the first row."""
     return State(norm(inputs.dy))
 
 
 def update(state: State, inputs: Inputs) -> State:
-    """One more row."""
+    """Add a row."""
     speed = norm(inputs.dy)
     return state if speed <= state.largest else State(speed)
 
 
 def outputs(state: State) -> Outputs:
-    """The speed."""
+    """Return the speed."""
     return Outputs(state.largest)

@@ -1,4 +1,4 @@
-"""What the controller holds the bound of a force to be."""
+"""Parameter estimates of the controller, halfway and at the end."""
 
 from __future__ import annotations
 
@@ -19,30 +19,30 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """What has acted."""
+    """Estimates that the controller has used."""
 
     half: Vector4  #: in the first step that ends in the second half
     end: Vector4  #: in the last step
 
 
 class Outputs(NamedTuple):
-    """Estimates of two times."""
+    """Estimates at two times."""
 
     theta_hat_half: Annotated[Vector4, Variable(THETA, "theta_hat halfway through the run")]
     theta_hat_end: Annotated[Vector4, Variable(THETA, "theta_hat at the end of the run")]
 
 
 def start() -> State:
-    """No step yet."""
+    """Begin without a step."""
     return State(_NONE, _NONE)
 
 
 def update(state: State, acting: Inputs, t: float, begin: float, end: float) -> State:
-    """One more step."""
+    """Add a step."""
     is_half = isnan(state.half[0]) and t >= begin + 0.5 * (end - begin)
     return State(acting.theta_hat if is_half else state.half, acting.theta_hat)
 
 
 def outputs(state: State) -> Outputs:
-    """What has acted."""
+    """Return the estimates."""
     return Outputs(state.half, state.end)

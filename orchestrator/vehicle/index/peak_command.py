@@ -1,4 +1,4 @@
-"""How much the controller asks for."""
+"""Largest command of the controller."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all steps so far."""
+    """Largest values of all steps so far."""
 
-    peak: Vector3  #: below zero: there was none
+    peak: Vector3  #: negative before the first step
 
 
 class Outputs(NamedTuple):
@@ -31,12 +31,12 @@ class Outputs(NamedTuple):
 
 
 def start() -> State:
-    """No step yet."""
+    """Begin without a step."""
     return State((-1.0, -1.0, -1.0))
 
 
 def update(state: State, acting: Inputs) -> State:
-    """One more step."""
+    """Add a step."""
     p_u, p_q, p_r = state.peak
     u, q, r = acting.command
     u, q, r = abs(u), abs(q), abs(r)
@@ -46,5 +46,5 @@ def update(state: State, acting: Inputs) -> State:
 
 
 def outputs(state: State) -> Outputs:
-    """The peak, if there was a step."""
+    """Return the peak, if there was a step."""
     return Outputs(state.peak if state.peak[0] >= 0.0 else (nan, nan, nan))

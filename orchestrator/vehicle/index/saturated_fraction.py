@@ -1,4 +1,4 @@
-"""How often the controller asks for more than the actuators give."""
+"""Share of steps in which a command exceeds the limits of the actuators."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all steps so far."""
+    """Counts over all steps so far."""
 
-    outside: Vector3  #: how many were outside
+    outside: Vector3  #: number of steps outside the limits
     steps: int
 
 
@@ -35,12 +35,12 @@ class Outputs(NamedTuple):
 
 
 def start() -> State:
-    """No step yet."""
+    """Begin without a step."""
     return State((0.0, 0.0, 0.0), 0)
 
 
 def update(state: State, acting: Inputs) -> State:
-    """One more step."""
+    """Add a step."""
     u, q, r = state.outside
     if acting.command[0] < acting.lower[0] or acting.command[0] > acting.upper[0]:
         u += 1.0
@@ -52,7 +52,7 @@ def update(state: State, acting: Inputs) -> State:
 
 
 def outputs(state: State) -> Outputs:
-    """The share, if there was a step."""
+    """Return the share, if there was a step."""
     if state.steps == 0:
         return Outputs((nan, nan, nan))
     u, q, r = state.outside

@@ -1,4 +1,4 @@
-"""When the control point reaches its reference, and how far from it it is later."""
+"""Time until the control point reaches its reference, and its largest error later."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all rows so far."""
+    """Results of all rows so far."""
 
-    reached: float  #: when [s]; not a number: not yet
+    reached: float  #: time [s]; not a number before it
     late: float  #: largest error of the second half [m]
 
 
@@ -42,19 +42,19 @@ class Outputs(NamedTuple):
 
 
 def error(inputs: Inputs) -> Vector3:
-    """e = y - y_d with the true control point [m]."""
+    """Return e = y - y_d with the true control point [m]."""
     phi, theta, psi = inputs.attitude
     y = control_point(inputs.position, rotation_from_euler(phi, theta, psi), inputs.ell)
     return sub(y, inputs.y_d)
 
 
 def start(inputs: Inputs, t: float, begin: float, end: float) -> State:
-    """The row of the start."""
+    """Begin with the first row."""
     return update(State(nan, -inf), inputs, t, begin, end)
 
 
 def update(state: State, inputs: Inputs, t: float, begin: float, end: float) -> State:
-    """One more row."""
+    """Add a row."""
     is_late = t >= begin + 0.5 * (end - begin)
     if not is_late and not isnan(state.reached):
         return state
@@ -67,5 +67,5 @@ def update(state: State, inputs: Inputs, t: float, begin: float, end: float) -> 
 
 
 def outputs(state: State) -> Outputs:
-    """What there was."""
+    """Return the time and the error."""
     return Outputs(state.reached, state.late if state.late >= 0.0 else nan)

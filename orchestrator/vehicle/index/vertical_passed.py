@@ -1,4 +1,4 @@
-"""When the pitch has passed 90 degrees, where (1) has a pole."""
+"""Time at which the pitch passes 90 degrees, where (1) has a pole."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu import Variable
 
-#: A pitch [rad] whose cosine is positive, as that of any smaller one.
+#: A pitch below 90 degrees [rad]: cosines of smaller ones need not be computed.
 _UPRIGHT = 1.5
 
 
@@ -18,10 +18,10 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all rows so far."""
+    """Results of all rows so far."""
 
     upright: float  #: cosine of the pitch at the start
-    passed: float  #: when [s]; not a number: not yet
+    passed: float  #: time [s]; not a number before it
 
 
 class Outputs(NamedTuple):
@@ -31,12 +31,12 @@ class Outputs(NamedTuple):
 
 
 def start(inputs: Inputs, t: float) -> State:
-    """The row of the start."""
+    """Begin with the first row."""
     return update(State(cos(inputs.pitch), nan), inputs, t)
 
 
 def update(state: State, inputs: Inputs, t: float) -> State:
-    """One more row."""
+    """Add a row."""
     cosine = cos(inputs.pitch) if abs(inputs.pitch) > _UPRIGHT else 1.0
     if isnan(state.passed) and cosine * state.upright <= 0.0:
         return State(state.upright, t)
@@ -44,5 +44,5 @@ def update(state: State, inputs: Inputs, t: float) -> State:
 
 
 def outputs(state: State) -> Outputs:
-    """The time."""
+    """Return the time."""
     return Outputs(state.passed)

@@ -8,10 +8,9 @@ from pathlib import Path
 import fmpy
 
 from fmus.discovery import write_archive
-from fmus.native.packaging import MAIN, sources
+from fmus.native.packaging import sources
 from fmus.ports.definition import Definition, define
-from fmus.ports.description import fmi2_description
-from fmus.ports.description_fmi3 import fmi3_description
+from fmus.ports.description import SOURCES, fmi2_description, fmi3_description
 from fmus.python.packaging import fmu_entries, seal
 from support.all_types import component, prompt, sampled
 from support.hosts import MEMORY
@@ -71,7 +70,7 @@ def native(
     (folder / "modelDescription.xml").write_bytes(_DESCRIBE[fmi](of, _GUID))
     watched = ["-O1", f"-fsanitize={sanitizers}", "-fno-sanitize-recover"]
     options = watched if sanitizers else ["-O2"]
-    command = [compiler, *_FLAGS, *options, "-o", library, MAIN[fmi], "-lm"]
+    command = [compiler, *_FLAGS, *options, "-o", library, SOURCES[fmi], "-lm"]
     subprocess.run(command, cwd=folder / "sources", check=True)
     files = [path for path in folder.rglob("*") if path.is_file()]
     entries = {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}

@@ -67,7 +67,9 @@ def test_numbers_too_many_for_the_stack_are_told(tmp_path, monkeypatch):
     )
     monkeypatch.chdir(tmp_path)
     lines = mistakes("own_lag.py")[1]
-    assert any("C takes at most 49152, which lie on a thread's stack" in line for line in lines)
+    assert any(
+        "C takes at most 49152, since they are on a thread's stack" in line for line in lines
+    )
 
 
 def test_an_expression_that_is_too_long_is_told(tmp_path, monkeypatch):

@@ -9,8 +9,7 @@ import pytest
 from fmus.discovery import source_of
 from fmus.native import packaging
 from fmus.native.packaging import fmu_entries
-from orchestrator.machine.compilers import Compiler
-from orchestrator.machine.platforms import platforms
+from orchestrator.machine.compilers import Compiler, platforms
 from support.settings import NAMES, REPRESENTATIVES
 
 PLANT = source_of("AuvPlant").definition

@@ -18,9 +18,10 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fmus.discovery import components, source_of
-from fmus.native.packaging import MAIN, sources
+from fmus.native.packaging import sources
 from fmus.native.translator import _directives
 from fmus.ports.behaviour import NUMBER_FORMAT
+from fmus.ports.description import SOURCES
 from fmus.python.component import LONGEST_MESSAGE
 from support.language import HEAD, Twins, module_of
 
@@ -296,7 +297,7 @@ def bits(numbers: list[float]) -> bytes:
 )
 def test_sources_are_c99_without_a_warning(tmp_path: Path, name: str, version: str, compiler: str):
     folder = written(tmp_path, name, version)
-    compile_in(folder, "-fsyntax-only", MAIN[version], compiler=compiler)
+    compile_in(folder, "-fsyntax-only", SOURCES[version], compiler=compiler)
 
 
 LINKED = """

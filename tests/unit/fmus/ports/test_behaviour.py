@@ -10,10 +10,10 @@ from types import ModuleType
 
 import pytest
 
-from fmus.discovery import package_folder
 from fmus.ports.behaviour import HOOKS, _message, read_behaviour
 from fmus.ports.groups import Nothing
 from fmus.ports.port import Misdeclared
+from orchestrator.machine.identity import package_folder
 
 GOOD = """\
 from __future__ import annotations
@@ -117,7 +117,11 @@ def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, 
             f"{SEED}{MEASURED}\n\ndef _moved".replace(", y: tuple[float, float])", ")"),
             "measured takes 0 groups of outputs, not one",
         ),
-        ("def _moved", "seed = measured = 1\n\n\ndef _moved", "seed is no function, but has the"),
+        (
+            "def _moved",
+            "seed = measured = 1\n\n\ndef _moved",
+            "seed is not a function, but has the",
+        ),
         (
             "start(parameters: Gains)",
             "start(parameters: State)",

@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 from auv_fmu import POSITIVE, Matrix, Variable, Vector
 from fmus.ports.definition import DefaultExperiment, Definition, Origin
-from fmus.ports.description import fmi2_description
-from fmus.ports.description_fmi3 import fmi3_description
+from fmus.ports.description import fmi2_description, fmi3_description
 from fmus.ports.fields import declared
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import Misdeclared, Port
@@ -136,7 +135,9 @@ def test_the_name_of_a_class_in_a_class_may_be_another_or_none():
     ]  # fmt: skip
     [first, *_] = ports("parameter", p=(Annotated[Gains, Variable(name="a.b")], Gains()))
     assert first.name == "a.b.k"
-    with pytest.raises(Misdeclared, match=r"^Fields.p is a NamedTuple, of which a Variable says"):
+    with pytest.raises(
+        Misdeclared, match=r"^Fields.p is a NamedTuple, and its Variable may have only"
+    ):
         ports("parameter", p=(Annotated[Gains, PLAIN], Gains()))
 
 

@@ -1,4 +1,4 @@
-"""What is kept in the user's cache folder is run: only as it was kept, and by nobody else."""
+"""Cached files are executed, so only unchanged files that no other user can write are read."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CONTENT = {"a.so": b"library", "b": b""}
 
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="only root has other users")
 
-#: Anybody but this user.
+#: Another user.
 STRANGER = 65534
 
 
@@ -35,7 +35,7 @@ def contents(found: dict[Path, bytes]) -> dict[str, bytes]:
 
 
 def is_refused(users: Path, culprit: Path) -> None:
-    """Nothing is taken from the user's folder, and one line says why."""
+    """Check that nothing is read from the user's folder, and that one warning gives the reason."""
     with pytest.warns(UserWarning, match="only you can write") as said:
         found = read_cached("kind", "0")
     assert not any(path.is_relative_to(users) for path in found)
@@ -45,7 +45,7 @@ def is_refused(users: Path, culprit: Path) -> None:
     assert all(path.is_relative_to(process_folder()) for path in paths)
 
 
-def test_what_was_kept_is_found_again(users):
+def test_kept_files_are_found_again(users):
     assert read_cached("kind", "0") == {}
     assert not users.exists()
     paths = write_cached("kind", "0", CONTENT)
@@ -55,7 +55,7 @@ def test_what_was_kept_is_found_again(users):
 
 
 @pytest.mark.parametrize("umask", [0, 0o002, 0o022, 0o077, 0o777])
-def test_nobody_else_may_enter_whatever_the_umask(users, umask):
+def test_only_the_user_may_enter_for_any_umask(users, umask):
     before = os.umask(umask)
     try:
         write_cached("kind", "0", CONTENT)
@@ -74,7 +74,7 @@ def test_a_folder_that_others_can_write_is_not_used(users, folder, mode):
     is_refused(users, users / "auv-fmu" / folder)
 
 
-def test_a_parent_by_which_others_could_swap_it_is_not_used(users):
+def test_a_folder_that_others_could_rename_is_not_used(users):
     write_cached("kind", "0", CONTENT)
     users.chmod(0o777)
     is_refused(users, users)
@@ -113,7 +113,7 @@ def test_links_are_not_followed_out_of_it(users, tmp_path, folder):
     is_refused(users, place)
 
 
-def test_the_users_own_links_to_it_are(users, tmp_path, monkeypatch):
+def test_the_users_own_links_to_it_are_followed(users, tmp_path, monkeypatch):
     (tmp_path / "disk").mkdir(0o700)
     users.symlink_to("disk")
     write_cached("kind", "0", CONTENT)
@@ -125,7 +125,7 @@ def test_the_users_own_links_to_it_are(users, tmp_path, monkeypatch):
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60)
 @given(data=st.data())
-def test_what_is_not_as_it_was_is_not_found_and_stays(users, tmp_path_factory, data):
+def test_changed_files_are_not_found_and_stay(users, tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("cache")
     os.environ["XDG_CACHE_HOME"] = str(folder)
     paths = write_cached("kind", "0", CONTENT)
@@ -157,7 +157,7 @@ def test_digests_lead_nowhere_else(users, tmp_path):
         assert read_cached("kind", "0") == {}
 
 
-def test_links_that_lead_to_each_other_are_said_when_something_is_written(users):
+def test_links_that_lead_to_each_other_are_reported_on_writing(users):
     users.symlink_to("other")
     users.with_name("other").symlink_to(users.name)
     assert read_cached("kind", "0") == {}
@@ -165,7 +165,7 @@ def test_links_that_lead_to_each_other_are_said_when_something_is_written(users)
         write_cached("kind", "0", CONTENT)
 
 
-def test_a_fifo_does_not_hold_it_up(users):
+def test_a_fifo_does_not_block(users):
     paths = write_cached("kind", "0", CONTENT)
     paths[0].unlink()
     os.mkfifo(paths[0])
@@ -173,7 +173,7 @@ def test_a_fifo_does_not_hold_it_up(users):
 
 
 @pytest.mark.parametrize("variables", [{"XDG_CACHE_HOME": "cache"}, {"HOME": "home"}, {"HOME": ""}])
-def test_the_current_folder_is_none(workplace, monkeypatch, variables):
+def test_the_current_folder_is_never_the_cache(workplace, monkeypatch, variables):
     monkeypatch.delenv("XDG_CACHE_HOME")
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
@@ -189,7 +189,7 @@ def test_the_current_folder_is_none(workplace, monkeypatch, variables):
     assert not list(workplace.iterdir())
 
 
-def test_a_cache_that_cannot_be_written_says_so(users):
+def test_a_cache_that_cannot_be_written_raises(users):
     users.write_text("")
     assert read_cached("kind", "0") == {}
     with pytest.raises(OSError, match="cache"):

@@ -1,4 +1,4 @@
-"""What a child says is heard at once, and nothing in the current folder is read by imports."""
+"""Output of children arrives at once, and imports read nothing from the current folder."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_figures_in_a_program_are_the_same_whatever_it_has_set(workplace, plain)
     assert figures(workplace / "results" / "fig4") == plain
 
 
-def test_workers_of_a_report_read_it_no_more(workplace):
+def test_workers_do_not_read_it(workplace):
     os.mkfifo("matplotlibrc")
     code = (
         "from orchestrator.machine.workers import workers\n"
@@ -93,8 +93,8 @@ def test_programs_take_nothing_from_the_current_folder(workplace, monkeypatch):
     assert {path.name for path in workplace.iterdir()} == before | {"cache", "results"}
 
 
-def test_lines_of_a_module_are_heard_before_it_ends(workplace, monkeypatch):
-    """It goes on only when its first line was heard."""
+def test_lines_of_a_module_arrive_before_it_ends(workplace, monkeypatch):
+    """The module continues only after its first line has arrived."""
     (workplace / "speaker.py").write_text(
         "import pathlib, sys, time\n"
         "print('first', flush=True)\n"
@@ -116,7 +116,7 @@ def test_lines_of_a_module_are_heard_before_it_ends(workplace, monkeypatch):
     assert process.stderr == "a complaint" + "." * 100_000 + "\n"
 
 
-def test_an_exception_ends_the_module_that_is_heard(workplace, monkeypatch):
+def test_an_exception_of_the_callback_ends_the_module(workplace, monkeypatch):
     (workplace / "speaker.py").write_text("while True:\n    print('again', flush=True)\n")
     monkeypatch.setenv("PYTHONPATH", str(workplace))
 

@@ -1,8 +1,9 @@
-"""Which compiler makes the libraries, what it says if it cannot, and universal ones of macOS."""
+"""Choice of the compiler, its error messages, platforms, and universal libraries of macOS."""
 
 from __future__ import annotations
 
 import os
+import platform
 import shutil
 import signal
 import subprocess
@@ -16,8 +17,15 @@ import pytest
 from fmus.language.mathematics import FUNCTIONS
 from fmus.python import packaging
 from orchestrator.machine import compilers
-from orchestrator.machine.compilers import COMPILERS, ROUNDED, compiler_for, library, universal
-from orchestrator.machine.platforms import platforms
+from orchestrator.machine.compilers import (
+    COMPILERS,
+    ROUNDED,
+    compiler_for,
+    library,
+    platforms,
+    this_machine,
+    universal,
+)
 from support.tiers import slow
 
 OWN = "/usr/bin/own-cc"
@@ -63,7 +71,7 @@ def test_other_machines_have_zig_for_all(machine: pytest.MonkeyPatch, names: str
     assert compiler_for(platforms("2", names)).name == "ziglang 0.99"
 
 
-def test_only_what_cannot_be_made_is_named(machine: pytest.MonkeyPatch):
+def test_only_platforms_without_a_compiler_are_named(machine: pytest.MonkeyPatch):
     with pytest.raises(OSError, match="no C compiler for win64: "):
         compiler_for(platforms("2", "linux64,win64"))
 
@@ -80,8 +88,8 @@ def test_apples_compiler_makes_what_a_mac_runs(machine: pytest.MonkeyPatch):
 
 @pytest.mark.skipif(packaging.loader_compiler() is None, reason="there is no C compiler")
 @pytest.mark.parametrize("name", [COMPILERS[0], *slow(*COMPILERS[1:])])
-def test_any_one_compiler_will_do(name, tmp_path, monkeypatch):
-    """Under whichever of its names there is."""
+def test_any_compiler_is_enough(name, tmp_path, monkeypatch):
+    """A compiler is found under any of its names."""
     real = compilers.machines_compiler()
     assert real is not None
     wrapper = tmp_path / name
@@ -96,8 +104,8 @@ def test_any_one_compiler_will_do(name, tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals are sent as POSIX has them")
-def test_an_interrupt_stays_one_though_the_compiler_has_ended():
-    """Python waits a quarter of a second for it, in which it ends."""
+def test_an_interrupt_is_raised_although_the_compiler_has_ended():
+    """Python waits a quarter of a second for it, and it ends in that time."""
     threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
         compilers.Compiler([sys.executable]).run("-c", "import time; time.sleep(0.6)")
@@ -119,7 +127,7 @@ def test_operations_are_never_contracted_nor_reordered():
 
 
 @needs_compiler
-def test_complaint_of_a_compiler_is_told_in_one_line():
+def test_error_of_a_compiler_is_reported_in_one_line():
     [own] = platforms("2" if compilers.this_machine() == "x86_64-linux" else "3")
     sources = {**SOURCES, "other.h": b"#error on purpose\n"}
     with pytest.raises(OSError, match=r"makes no Answer for .*other.h.*on purpose") as error:
@@ -127,7 +135,7 @@ def test_complaint_of_a_compiler_is_told_in_one_line():
     assert "\n" not in str(error.value)
 
 
-#: How a library begins, and the number of its processor: at its place, in that many bytes.
+#: First bytes of a library, and the offset and bytes of the number of its processor.
 HEADS = {
     "x86_64-linux": (b"\x7fELF\x02\x01", 18, (0x3E).to_bytes(2, "little")),
     "aarch64-linux": (b"\x7fELF\x02\x01", 18, (0xB7).to_bytes(2, "little")),
@@ -160,14 +168,14 @@ PAGE = 16384
 
 
 def thin(processor: str, size: int) -> bytes:
-    """The head of a 64-bit Mach-O library without load commands, and what may follow."""
+    """Return the header of a 64-bit Mach-O library without load commands, and some bytes."""
     kind, model = PROCESSORS[processor]
     words = (0xFEEDFACF, kind, model, 6, 0, 0, 0, 0)
     return b"".join(word.to_bytes(4, "little") for word in words).ljust(size, b"\x5a")
 
 
 def read(content: bytes) -> list[tuple[int, int, bytes]]:
-    """Processors and libraries of a universal file."""
+    """Return the processors and libraries of a universal file."""
 
     def word(place: int) -> int:
         return int.from_bytes(content[4 * place : 4 * place + 4], "big")
@@ -186,7 +194,7 @@ def read(content: bytes) -> list[tuple[int, int, bytes]]:
 
 
 @pytest.mark.parametrize("sizes", [(100, 200), (PAGE - 48, PAGE), (3 * PAGE + 1, 1000)])
-def test_libraries_come_out_as_they_went_in(sizes):
+def test_libraries_are_unchanged_in_a_universal_file(sizes):
     libraries = [thin(name, size) for name, size in zip(PROCESSORS, sizes, strict=True)]
     expected = [
         (*processor, library)
@@ -211,6 +219,88 @@ def test_command_file_knows_it(tmp_path: Path):
     assert "arm64" in said
 
 
-def test_compilers_leave_every_function_whose_result_is_rounded():
+def test_compilers_evaluate_no_function_whose_result_is_rounded():
     rounded = {name for name, one in FUNCTIONS.items() if one.is_rounded and not one.factor}
     assert set(ROUNDED) == rounded
+
+
+# Platforms
+
+#: Names of folders in `binaries`: FMI 2.0.4, section 2.3, has its own names for x86 and refers to
+#: FMI 3.0.1, section 2.5.1.4.1, for other processors.
+FOLDERS = {
+    "2": {
+        "linux64": ".so",
+        "win64": ".dll",
+        "darwin64": ".dylib",
+        "aarch64-linux": ".so",
+        "aarch64-darwin": ".dylib",
+    },
+    "3": {
+        "x86_64-linux": ".so",
+        "aarch64-linux": ".so",
+        "x86_64-windows": ".dll",
+        "x86_64-darwin": ".dylib",
+        "aarch64-darwin": ".dylib",
+    },
+}
+
+#: Names of platforms in both versions of FMI, by the processor and system that Python reports.
+MACHINES = {
+    ("x86_64", "Linux"): (["linux64"], ["x86_64-linux"]),
+    ("aarch64", "Linux"): (["aarch64-linux"], ["aarch64-linux"]),
+    ("AMD64", "Windows"): (["win64"], ["x86_64-windows"]),
+    ("x86_64", "Darwin"): (["darwin64"], ["x86_64-darwin"]),
+    # Hosts look into one or the other.
+    ("arm64", "Darwin"): (["darwin64", "aarch64-darwin"], ["aarch64-darwin"]),
+    ("riscv64", "Linux"): ([], []),
+}
+
+
+@pytest.mark.parametrize("fmi", FOLDERS)
+def test_all_platforms_have_the_names_of_the_standard(fmi: str):
+    assert {found.name: found.ending for found in platforms(fmi, "all")} == FOLDERS[fmi]
+
+
+@pytest.mark.parametrize("machine", MACHINES, ids=" ".join)
+@pytest.mark.parametrize("fmi", FOLDERS)
+def test_default_platform_is_this_machine(fmi, machine, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(platform, "machine", lambda: machine[0])
+    monkeypatch.setattr(platform, "system", lambda: machine[1])
+    names = MACHINES[machine][list(FOLDERS).index(fmi)]
+    if names:
+        assert [found.name for found in platforms(fmi)] == names
+        assert all(this_machine() in found.machines for found in platforms(fmi))
+    else:
+        with pytest.raises(ValueError, match=f"no platform for this machine, {machine[0]}-"):
+            platforms(fmi)
+
+
+def test_names_may_be_given_in_any_order_and_twice():
+    wanted = platforms("2", "win64, linux64,win64")
+    assert [found.name for found in wanted] == ["linux64", "win64"]
+
+
+def test_library_of_macos_is_for_both_of_its_processors():
+    [darwin] = platforms("2", "darwin64")
+    assert darwin.machines == ("x86_64-darwin", "aarch64-darwin")
+
+
+@pytest.mark.parametrize(
+    ("fmi", "names", "complaint"),
+    [
+        (
+            "2",
+            "win32",
+            "FMI 2.0 has no platform 'win32'; there are linux64, win64, darwin64, aarch64-linux, "
+            "aarch64-darwin, or all$",
+        ),
+        ("2", "linux64,", "no platform ''"),
+        ("2", "all,linux64", "no platform 'all'"),
+        ("2", "x86_64-linux", "no platform 'x86_64-linux'.*; try --fmi 3$"),
+        ("3", "linux64", "FMI 3.0 has no platform 'linux64'.*; try --fmi 2$"),
+    ],
+)
+def test_unknown_platform_is_named(fmi: str, names: str, complaint: str):
+    with pytest.raises(ValueError, match=complaint):
+        platforms(fmi, names)

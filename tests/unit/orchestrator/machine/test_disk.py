@@ -5,6 +5,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import re
 import signal
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
@@ -16,11 +17,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from orchestrator.machine import disk
-from orchestrator.machine.disk import LOCK, hold_lock, move_aside, process_folder, sealed, unsealed
+from orchestrator.machine.disk import (
+    LOCK,
+    file_name,
+    hold_lock,
+    move_aside,
+    plain_file_names,
+    process_folder,
+    sealed,
+    unsealed,
+)
 from support.machine import contents, ended, eventually, forked
 
 
-def test_what_a_process_has_claimed_is_kept_from_others_until_it_is_killed(tmp_path: Path):
+def test_a_lock_is_held_until_its_process_is_killed(tmp_path: Path):
     def work() -> None:
         with hold_lock(tmp_path):
             (tmp_path / "held").touch()
@@ -36,8 +46,8 @@ def test_what_a_process_has_claimed_is_kept_from_others_until_it_is_killed(tmp_p
         pass
 
 
-def test_folders_that_no_process_has_made_stay(tmp_path: Path, monkeypatch):
-    """A temporary folder is everybody's, and names are free."""
+def test_folders_without_a_marker_stay(tmp_path: Path, monkeypatch):
+    """All programs share the folder for temporary files, and may use our names."""
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     precious = tmp_path / "precious"
     for folder in (precious, tmp_path / "auvfmu-mine", tmp_path / "auvfmu-copied"):
@@ -54,8 +64,8 @@ def test_folders_that_no_process_has_made_stay(tmp_path: Path, monkeypatch):
     assert not (tmp_path / "auvfmu-copied").exists()
 
 
-def test_temporary_folders_of_killed_processes_go_with_the_next(tmp_path: Path, monkeypatch):
-    # Held, or a fork that forgets it would remove that of this process.
+def test_temporary_folders_of_killed_processes_are_removed_by_the_next(tmp_path: Path, monkeypatch):
+    # Keep a reference: otherwise a fork that drops the object removes the folder.
     own = disk._process_folder()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
 
@@ -93,14 +103,14 @@ def test_threads_share_one_temporary_folder(tmp_path: Path, monkeypatch):
 
 
 @pytest.mark.parametrize("content", [b"mine", b""])
-def test_a_file_of_the_users_that_is_called_like_a_lock_stays(tmp_path: Path, content: bytes):
+def test_a_users_file_with_the_name_of_a_lock_stays(tmp_path: Path, content: bytes):
     (tmp_path / LOCK).write_bytes(content)
     with hold_lock(tmp_path), pytest.raises(BlockingIOError), hold_lock(tmp_path):
         pass
     assert not content or (tmp_path / LOCK).read_bytes() == content
 
 
-def test_a_lock_that_cannot_be_removed_while_it_is_open_is_removed_then(tmp_path, monkeypatch):
+def test_a_lock_that_cannot_be_removed_while_open_is_removed_later(tmp_path, monkeypatch):
     """As on Windows."""
     unlink, opened = Path.unlink, [True]
 
@@ -115,7 +125,7 @@ def test_a_lock_that_cannot_be_removed_while_it_is_open_is_removed_then(tmp_path
     assert not opened and not (tmp_path / LOCK).exists()
 
 
-def test_no_lock_is_taken_by_a_link(tmp_path: Path):
+def test_no_lock_is_taken_through_a_link(tmp_path: Path):
     (tmp_path / "precious").touch()
     (tmp_path / "r").mkdir()
     (tmp_path / "r" / LOCK).symlink_to("../precious")
@@ -126,7 +136,7 @@ def test_no_lock_is_taken_by_a_link(tmp_path: Path):
 
 
 @pytest.mark.parametrize("number", [errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS])
-def test_where_there_are_no_locks_nobody_is_kept_out(tmp_path: Path, monkeypatch, number):
+def test_without_locks_in_the_file_system_work_continues(tmp_path: Path, monkeypatch, number):
     def cannot(*_: object) -> None:
         raise OSError(number, os.strerror(number))
 
@@ -135,7 +145,7 @@ def test_where_there_are_no_locks_nobody_is_kept_out(tmp_path: Path, monkeypatch
         pass
 
 
-def test_what_is_moved_aside_replaces_nothing(tmp_path: Path):
+def test_moving_aside_replaces_nothing(tmp_path: Path):
     for text in ("first", "second"):
         (tmp_path / "a").write_text(text)
         move_aside(tmp_path / "a")
@@ -145,7 +155,7 @@ def test_what_is_moved_aside_replaces_nothing(tmp_path: Path):
     (tmp_path / "a").symlink_to("nowhere")
     move_aside(tmp_path / "a")
     assert contents(tmp_path) == {"a.~1~": b"first", "a.~2~": b"second", "a.~3~/b": b"third"}
-    assert os.readlink(tmp_path / "a.~4~") == "nowhere"  # noqa: PTH115  # not what it leads to
+    assert os.readlink(tmp_path / "a.~4~") == "nowhere"  # noqa: PTH115  # not its target
 
 
 values = st.recursive(
@@ -158,3 +168,31 @@ values = st.recursive(
 @given(st.dictionaries(st.text().filter(lambda key: key != "sha256"), values))
 def test_sealed_records_read_back(content):
     assert json.dumps(unsealed(sealed(content))) == json.dumps(content)
+
+
+# Names of files
+
+#: Words, signs of paths, and letters that some file systems take for others.
+NAMES = st.text("aAbß.é/\\:*? -_", max_size=6) | st.sampled_from(["con", "LPT1.x", "..", "x" * 300])
+
+
+@given(st.lists(NAMES, unique=True))
+def test_every_name_gets_a_different_file_name_on_every_system(names):
+    found = [file_name(name) for name in names]
+    assert len(set(found)) == len(names)
+    for name in found:
+        assert not re.search(r'[/\\:*?"<>|\0]', name) and not name.startswith(".")
+        assert name == name.strip() and not name.endswith(".") and 0 < len(name.encode()) < 200
+        assert name.split(".")[0].lower() not in ("con", "lpt1")
+    beside: list[str] = []
+    for name in names:
+        beside.append(file_name(name, beside))
+    assert len({name.casefold() for name in beside}) == len(names)
+
+
+@given(st.lists(NAMES), st.lists(NAMES))
+def test_names_for_a_uri_are_plain_and_no_two_differ_in_case_only(names, taken):
+    found = plain_file_names(names, *taken)
+    assert len(found) == len(names) == len({name.lower() for name in found})
+    assert {name.lower() for name in found}.isdisjoint(name.lower() for name in taken)
+    assert all(re.fullmatch(r"[A-Za-z0-9_.-]*", name) for name in found)

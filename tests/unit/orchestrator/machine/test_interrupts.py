@@ -22,7 +22,7 @@ def test_signals_are_collected_and_announced_at_once():
     assert said == [False, True]
 
 
-def test_what_a_batch_system_sends_is_urgent():
+def test_signals_of_a_batch_system_are_urgent():
     with held_interrupts() as interrupts:
         os.kill(os.getpid(), signal.SIGTERM)
         assert interrupts.urgent
@@ -41,7 +41,7 @@ def test_handlers_are_restored():
     assert signal.getsignal(signal.SIGINT) is before
 
 
-def test_other_threads_hold_nothing():
+def test_other_threads_collect_nothing():
     found: list[Interrupts] = []
 
     def work() -> None:
@@ -54,7 +54,7 @@ def test_other_threads_hold_nothing():
     assert not found[0]
 
 
-def test_what_is_ignored_stays_ignored():
+def test_ignored_signals_stay_ignored():
     """nohup ignores SIGHUP."""
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
@@ -65,7 +65,7 @@ def test_what_is_ignored_stays_ignored():
         signal.signal(signal.SIGHUP, before)
 
 
-def test_without_a_thread_nobody_insists_and_everything_else_goes_on(monkeypatch):
+def test_if_no_thread_starts_only_the_third_signal_is_lost(monkeypatch):
     def cannot(_: threading.Thread) -> None:
         raise RuntimeError("can't start new thread")
 
@@ -75,7 +75,7 @@ def test_without_a_thread_nobody_insists_and_everything_else_goes_on(monkeypatch
         assert interrupts
 
 
-def test_signals_before_and_after_are_no_insistence():
+def test_only_signals_within_the_context_are_counted():
     given_up: list[str] = []
     with held_interrupts() as interrupts:
         for _ in range(3):
@@ -87,7 +87,7 @@ def test_signals_before_and_after_are_no_insistence():
     assert given_up == []
 
 
-def test_many_signals_at_once_leave_a_step_the_time_to_return():
+def test_many_signals_at_once_leave_a_step_time_to_return():
     given_up: list[str] = []
     with (
         held_interrupts() as interrupts,

@@ -1,4 +1,4 @@
-"""Each branch, with systems that are faked: what is called and asked for, not what they answer.
+"""Each branch, with fakes of the systems: they record calls and arguments.
 
 `.ci/windows` runs the branches of Windows in wine. The branches of macOS were never run there.
 """
@@ -20,7 +20,7 @@ from orchestrator.machine import operating_system
 
 @pytest.fixture
 def on(monkeypatch):
-    """Have the module take this machine for another one."""
+    """Let the module take this machine for another one."""
 
     def take_for(name: str) -> None:
         faked = SimpleNamespace(platform=name, maxsize=sys.maxsize)
@@ -30,7 +30,7 @@ def on(monkeypatch):
 
 
 class Kernel:
-    """What is asked of Windows' kernel."""
+    """Calls of Windows' kernel."""
 
     def __init__(self) -> None:
         self.ignores: list[bool] = []
@@ -61,7 +61,7 @@ def test_processes_of_linux_inherit_that_ctrl_c_is_blocked():
     assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
-def test_what_windows_has_not(on):
+def test_limits_of_windows(on):
     on("linux")
     assert operating_system.can_isolate()
     assert operating_system.most_processes() > 10_000
@@ -71,7 +71,7 @@ def test_what_windows_has_not(on):
     assert operating_system.most_processes() == 61
 
 
-def test_files_and_no_folders_are_written_through_on_windows(on, tmp_path: Path, monkeypatch):
+def test_files_but_not_folders_are_flushed_on_windows(on, tmp_path: Path, monkeypatch):
     synced = []
     monkeypatch.setattr(os, "fsync", lambda number: synced.append(os.fstat(number).st_ino))
     path = tmp_path / "file"
@@ -83,7 +83,7 @@ def test_files_and_no_folders_are_written_through_on_windows(on, tmp_path: Path,
     assert path.read_text() == "text"
 
 
-def test_macos_is_asked_for_the_drive_too(on, tmp_path: Path, monkeypatch):
+def test_macos_flushes_the_drive_too(on, tmp_path: Path, monkeypatch):
     asked, synced, knows = [], [], True
 
     def fcntl(number, what):
@@ -104,7 +104,7 @@ def test_macos_is_asked_for_the_drive_too(on, tmp_path: Path, monkeypatch):
 
 @pytest.mark.parametrize("system", ["linux", "win32"])
 def test_renaming_replaces_nothing(on, tmp_path: Path, monkeypatch, system: str):
-    """Windows refuses by itself; here its refusal is faked."""
+    """Windows refuses by itself, which is faked here."""
     rename = Path.rename
 
     def as_windows(path: Path, new: Path) -> Path:
@@ -127,7 +127,7 @@ def test_renaming_replaces_nothing(on, tmp_path: Path, monkeypatch, system: str)
     assert not (tmp_path / "file").exists()
 
 
-def test_windows_keeps_others_out_where_modes_say_nothing(on, tmp_path: Path):
+def test_modes_are_ignored_on_windows(on, tmp_path: Path):
     tmp_path.chmod(0o777)
     status = tmp_path.stat()
     assert operating_system.others_write(status) and operating_system.is_mine(status)
@@ -137,7 +137,7 @@ def test_windows_keeps_others_out_where_modes_say_nothing(on, tmp_path: Path):
     assert not operating_system.others_write(status) and operating_system.is_mine(others)
 
 
-def test_end_of_a_pipe_is_asked_for_on_windows(kernel: Kernel, monkeypatch):
+def test_end_of_a_pipe_is_polled_on_windows(kernel: Kernel, monkeypatch):
     asked = []
 
     def peek(handle, size):
@@ -161,7 +161,7 @@ def test_end_of_a_pipe():
     os.close(reading)
 
 
-def test_signals_wait_for_no_reader():
+def test_signals_do_not_wait_for_a_reader():
     reading, writing = os.pipe()
     operating_system.never_wait_for_pipe(writing)
     assert not os.get_blocking(writing)
@@ -169,7 +169,7 @@ def test_signals_wait_for_no_reader():
     os.close(writing)
 
 
-def test_floating_point_mode_by_the_names_that_each_system_has(on, monkeypatch):
+def test_floating_point_functions_have_the_names_of_each_system(on, monkeypatch):
     library = SimpleNamespace(_fpreset="reset", fegetenv="get", fesetenv=lambda mode: mode)
     opened = []
     monkeypatch.setattr(ctypes, "PyDLL", lambda name: opened.append(name) or library)

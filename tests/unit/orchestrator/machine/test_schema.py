@@ -1,4 +1,4 @@
-"""What a schema allows passes, and each mistake is named once, by its way and what could stand."""
+"""Valid tables pass, and each mistake is reported once, with its path and the valid values."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ WHOLE: dict[str, Any] = {
 
 
 @pytest.mark.parametrize("gone", [(), ("times", "pace"), ("back", "legs"), ("rest",)])
-def test_what_is_allowed_passes_and_is_left_as_it_is(gone):
+def test_valid_tables_pass_unchanged(gone):
     content = {key: value for key, value in WHOLE.items() if key not in gone}
     before = deepcopy(content)
     Route.check("a.toml", content)
@@ -70,7 +70,7 @@ def test_what_is_allowed_passes_and_is_left_as_it_is(gone):
         ({"back": 1}, ["back 1 true false"]),
         ({"rest": "none"}, ["rest none"]),
         ({"rest": float("nan")}, ["rest nan"]),
-        # Of the two things that may stand there it is a table.
+        # The value has the second of the two allowed types: a table.
         ({"rest": {"length": "far"}}, ["rest length far"]),
         ({"legs": [{"length": 1.0}, {"length": "x"}]}, ["leg 2 length x"]),
         ({"legs": [{"speed": 1.0}]}, ["leg 1 length 1.5"]),
@@ -78,7 +78,7 @@ def test_what_is_allowed_passes_and_is_left_as_it_is(gone):
         ({"times": 0, "pace": "x"}, ["times 0", "pace x"]),
     ],
 )
-def test_each_mistake_is_named_once(change, culprits):
+def test_each_mistake_is_reported_once(change, culprits):
     for table, content in ((Route, {**WHOLE, **change}), (Routes, {"home": {**WHOLE, **change}})):
         with pytest.raises(Refused) as error:
             table.check("a.toml", content)
@@ -89,12 +89,12 @@ def test_each_mistake_is_named_once(change, culprits):
             assert mentions(problem, words + (" home" if table is Routes else ""))
 
 
-def test_entries_stand_as_in_the_file():
+def test_entries_have_the_order_and_keys_of_the_file():
     found = entries(Route)
     assert list(found) == ["who", "times", "pace", "back", "legs", "rest"]
     assert found["back"].meaning == "Whether back." and found["back"].default == "no"
     assert mentions(found["times"].type, "1 1,000") and mentions(found["pace"].type, "slow fast")
-    # An entry that may be left out may not be nothing: TOML has no word for it.
+    # An optional entry cannot be None, which TOML lacks.
     assert not any("None" in one.type for one in found.values())
 
 
@@ -108,7 +108,7 @@ NAMES = st.lists(st.sampled_from("ab"), min_size=1, max_size=3).map(tuple)
 
 
 def nested(names: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
-    """A table with values by names, of which some first parts are quoted as one."""
+    """Nest values by their names, some of whose first parts are quoted as one key."""
     table: dict[str, Any] = {}
     for name, quoted in names:
         *path, last = (".".join(name[:quoted]), *name[quoted:]) if quoted else name
@@ -124,10 +124,10 @@ def nested(names: list[tuple[tuple[str, ...], int]]) -> dict[str, Any]:
 
 
 @given(st.lists(st.tuples(NAMES, st.integers(0, 3)), max_size=5))
-def test_a_name_that_is_stated_twice_is_named_however_it_is_quoted(names):
+def test_a_name_that_is_stated_twice_is_reported_for_any_quoting(names):
     table = nested(names)
     stated = [".".join(name) for name, _ in names if table]
-    # What TOML itself refuses, or no system has, is not meant.
+    # Skip names that TOML refuses, or that no system has.
     assume(not any(name.startswith(f"{other}.") for name in stated for other in stated))
     twice = {name for name in stated if stated.count(name) > 1}
     for content, where in (({"values": table}, "values"), ({"parts": [{}, table]}, "part 2")):

@@ -22,7 +22,7 @@ def test_bar_is_a_widget_in_a_notebook_that_has_widgets(monkeypatch, kernel, wid
     monkeypatch.delitem(sys.modules, "ipykernel", raising=False)
     if kernel:
         monkeypatch.setitem(sys.modules, "ipykernel", SimpleNamespace())
-    where = "orchestrator.machine.progress"
+    where = "orchestrator.machine.lazy"
     monkeypatch.setattr(f"{where}.import_module", module)
     monkeypatch.setattr(f"{where}.find_spec", lambda _: SimpleNamespace() if widgets else None)
     Progress("fig4").begin(Header((), Experiment(1.0, 0.1)))

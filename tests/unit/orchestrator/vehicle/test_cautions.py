@@ -1,4 +1,4 @@
-"""What is said of a run after it, against what the run itself has integrated."""
+"""Warnings after a run, against the pitch integrated from its rows."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ FIVE = {"plant.roll": False, "plant.noise.std": 0.0}
 
 
 def pitch(result):
-    """By (1), whose pitch turns at q: Euler's scheme, a row a step."""
+    """Integrate the pitch of (1), whose rate is q, by Euler's scheme with a step for each row."""
     q = result["plant.nu.q"]
     return np.concatenate(([0.0], 0.02 * np.cumsum(q[:-1])))
 
@@ -27,7 +27,7 @@ def pitch(result):
         ("fig5-pd", FIVE, 0.5),
     ],
 )
-def test_five_degrees_of_freedom_that_pass_the_vertical_are_told(scenario, parameters, stop_time):
+def test_passing_the_vertical_without_roll_is_reported(scenario, parameters, stop_time):
     result = simulate(scenario, parameters, stop_time=stop_time, kind="native")
     beyond = pitch(result) > np.pi / 2
     watch = Watch()

@@ -55,7 +55,7 @@ SIGNALS = {
     "controller.dy_hat.x": lambda t: 3.0 * np.cos(t) + np.sin(2.0 * pi * t),
     "controller.dy_hat.y": lambda t: 4.0 * np.cos(t),
     "controller.dy_hat.z": lambda t: 0.0 * t + 2.0,
-    # A step ends a step later.
+    # Outputs of a step have the time of its end.
     **{f"controller.theta_hat[{i}]": lambda t, i=i: i * (t + H) for i in range(1, 5)},
 }
 ESTIMATES = (*STANDARD.dy_hat, *STANDARD.theta_hat)
@@ -84,7 +84,7 @@ def indices(signals=SIGNALS, blocks=1):
 
 
 def noise() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
-    """Numbers that round, for all that indices are of."""
+    """Return noise for every signal of the indices, so that sums round."""
     random = np.random.default_rng(1)
     values = {
         name: random.normal(scale=3.0, size=len(TIME))
@@ -93,7 +93,7 @@ def noise() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
     return {name: lambda t, of=of: of for name, of in values.items()}
 
 
-def test_indices_of_signals_that_are_known():
+def test_indices_of_known_signals():
     found = indices()
     # 10 exp(-t) is one metre at t = log 10, between two rows.
     assert log(10.0) < found.pop("time_to_reach") < log(10.0) + H
@@ -113,23 +113,23 @@ def test_indices_of_signals_that_are_known():
 
 
 @pytest.mark.parametrize("blocks", [2, 7, 251, len(TIME)])
-def test_blocks_in_which_rows_come_change_nothing(blocks):
-    """To the last bit, on numbers that round."""
+def test_sizes_of_blocks_change_nothing(blocks):
+    """Results are equal to the last bit, although sums round."""
     signals = noise()
     assert indices(signals).keys() >= set(index_columns()) - {"time_to_reach"}
     assert indices(signals, blocks) == indices(signals)
 
 
 @pytest.mark.parametrize("blocks", [1, 7, len(TIME)])
-def test_the_row_that_signals_stand_in_changes_nothing(blocks):
-    """To the last bit; the last row holds what never acts."""
+def test_the_order_of_a_run_changes_nothing(blocks):
+    """Results are equal to the last bit; in one order, values of the last row are never used."""
     lagged = table_with(noise(), "gauss-seidel")
     acting = (*ESTIMATES, *STANDARD.commanded, *STANDARD.applied)
     assert indices_of(at_its_time(lagged, acting), blocks) == indices_of(lagged)
 
 
-def test_of_actuators_with_a_lag_the_end_of_a_step_counts():
-    """What they give is a state, which stands in the row of its time."""
+def test_for_actuators_with_a_lag_the_end_of_a_step_counts():
+    """Their output is a state, so it is in the row of its time."""
     lagged = table_with(noise(), "gauss-seidel", {"plant.actuator.T.q": 0.1}.items())
     u, q, r = STANDARD.applied
     moved = at_its_time(lagged, (*ESTIMATES, *STANDARD.commanded, u, r))
@@ -148,17 +148,17 @@ def test_of_actuators_with_a_lag_the_end_of_a_step_counts():
         ("planner", ["late_error", "time_to_reach", *(f"final_error.{axis}" for axis in AXES)]),
     ],
 )
-def test_what_a_system_has_no_ports_for_is_not_there(group, without):
+def test_indices_without_ports_are_left_out(group, without):
     rest = {name: signal for name, signal in SIGNALS.items() if not name.startswith(group)}
     assert indices().keys() - indices(rest).keys() == set(without)
 
 
-def test_what_is_never_reached_is_not_there():
+def test_an_index_that_is_never_reached_is_left_out():
     away = {**SIGNALS, "plant.eta.z": lambda t: 0.0 * t + 1.01}
     assert indices().keys() - indices(away).keys() == {"time_to_reach"}
 
 
-def test_closed_loop_has_all_of_them():
+def test_closed_loop_has_all_indices():
     _, system = load_scenario("fig4", "native")
     experiment, observer = Experiment(4.0, 0.02), Indices()
     simulate_plan(make_plan(system, experiment, loop="auto"), [observer])
@@ -173,7 +173,7 @@ def test_an_index_is_in_the_language_of_equations(module):
 
 
 def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
-    """It is in metrics.json, in the table of a study, and in the labels of its figures."""
+    """It appears in metrics.json, in the table of a study, and in the labels of its figures."""
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     depth = Index("largest_depth", "largest depth", read_reducer(largest_depth), is_metric=True)
     monkeypatch.setattr(table_of_indices, "INDICES", (*table_of_indices.INDICES, depth))
@@ -206,7 +206,7 @@ def table_of(**columns: np.ndarray) -> Table:
 
 
 def test_effort_of_a_known_signal():
-    """3 sin(2 pi t) over 4 s, cut off at +-2: its norm, RMS, variation and share beyond."""
+    """For 3 sin(2 pi t) over 4 s, clipped at +-2: norm, RMS, variation and saturated share."""
     t = np.arange(4001) * 0.001
     command = 3.0 * np.sin(2 * pi * t)
     applied = np.clip(command, -2.0, 2.0)

@@ -1,4 +1,4 @@
-"""Reducers over rows that were never made."""
+"""Reducers over made-up rows."""
 
 from __future__ import annotations
 
@@ -14,11 +14,10 @@ from auv_fmu import Variable
 from fmus.ports.reducer import read_reducer
 from orchestrator.cosim import Experiment, Header, Order, PortName
 from orchestrator.machine.errors import InputError
-from orchestrator.vehicle import compiled_reducers, reduction
+from orchestrator.vehicle import reduction
 from orchestrator.vehicle.cautions import WATCHED
-from orchestrator.vehicle.compiled_reducers import library_of
 from orchestrator.vehicle.indices import INDICES
-from orchestrator.vehicle.reduction import Reduction, reductions_of, sources_of
+from orchestrator.vehicle.reduction import Reduction, library_of, reductions_of, sources_of
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop
 
 N = 21
@@ -32,7 +31,7 @@ class Mode(IntEnum):
 
 
 class Inputs(NamedTuple):
-    """Of every type, and what a run may lack."""
+    """Inputs of every type, and one that a run may lack."""
 
     x: Annotated[float, Variable("m", "A signal", name="plant.x")]
     n: Annotated[int, Variable(description="A whole number", name="plant.n")]
@@ -43,7 +42,7 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """All that was told."""
+    """All arguments of the hooks."""
 
     rows: tuple[float, ...]
     seen: tuple[object, ...] = ()
@@ -56,8 +55,8 @@ class Outputs(NamedTuple):
     rest: Annotated[tuple[float, float], Variable("1", "Others")]
 
 
-class Told(NamedTuple):
-    """What a step tells."""
+class Step(NamedTuple):
+    """Arguments of a step."""
 
     inputs: Inputs
     before: float
@@ -67,22 +66,22 @@ class Told(NamedTuple):
 
 
 def start(inputs: Inputs, t: float, begin: float, end: float) -> State:
-    """The first row."""
+    """Begin with the first row."""
     return State((inputs.x,), ((t, begin, end),))
 
 
 def update(
     state: State, inputs: Inputs, before: Inputs, acting: Inputs, t: float, h: float
 ) -> State:
-    """One more row."""
+    """Add a row."""
     if inputs.x == 13.0 and inputs.k == 13.0:
         raise ValueError("thirteen")
-    told = Told(inputs, before.x, acting.x, t, h)
-    return State((*state.rows, inputs.x), (*state.seen, told))
+    step = Step(inputs, before.x, acting.x, t, h)
+    return State((*state.rows, inputs.x), (*state.seen, step))
 
 
 def outputs(state: State, t: float) -> Outputs:
-    """What came of it."""
+    """Return the results."""
     return Outputs(sum(state.rows), (t, nan))
 
 
@@ -116,25 +115,25 @@ def reduced(of: Header, blocks: int = 1, last: float | None = None) -> Reduction
 
 
 def state(one: Reduction) -> State:
-    # These hooks are no equations, so they run in Python.
+    # These hooks are outside the language, so they run in Python.
     return one._reducing._state
 
 
 @pytest.mark.parametrize("blocks", [1, 4, N])
 @pytest.mark.parametrize("order", ["feedthrough", "gauss-seidel"])
-def test_hooks_are_told_what_a_row_holds(order, blocks):
+def test_hooks_receive_the_values_of_rows(order, blocks):
     first, *steps = state(reduced(header(order), blocks)).seen
     assert first == (-1.0, -1.0, 10.0)
     assert len(steps) == N - 1
-    for k, told in enumerate(steps, start=1):
-        assert told.inputs == Inputs(float(k), k % 4, bool(k % 2), Mode.ON, 1.0, 7.0)
-        assert type(told.inputs.n) is int and type(told.inputs.is_on) is bool
-        assert told.inputs.mode is Mode.ON
-        assert (told.before, told.acting) == (k - 1.0, k - 1.0 if order == "feedthrough" else k)
-        assert (told.t, told.h) == (0.5 * k - 1.0, 0.5)
+    for k, step in enumerate(steps, start=1):
+        assert step.inputs == Inputs(float(k), k % 4, bool(k % 2), Mode.ON, 1.0, 7.0)
+        assert type(step.inputs.n) is int and type(step.inputs.is_on) is bool
+        assert step.inputs.mode is Mode.ON
+        assert (step.before, step.acting) == (k - 1.0, k - 1.0 if order == "feedthrough" else k)
+        assert (step.t, step.h) == (0.5 * k - 1.0, 0.5)
 
 
-def test_what_is_not_a_number_is_there_only_beside_numbers():
+def test_not_a_number_is_kept_only_next_to_numbers():
     found = reduced(header()).found()
     assert found["total"] == [N * (N - 1) / 2]
     assert found["rest"][0] == 9.0 and np.isnan(found["rest"][1])
@@ -142,25 +141,25 @@ def test_what_is_not_a_number_is_there_only_beside_numbers():
 
 @pytest.mark.parametrize("blocks", [1, 4, N])
 def test_only_the_last_seconds_count(blocks):
-    """Before the end at 9 s: the rows of 7.5, 8, 8.5 and 9 s."""
+    """The run ends at 9 s: the rows of 7.5, 8, 8.5 and 9 s count."""
     assert reduced(header(), blocks, 1.5).found()["total"] == [17.0 + 18.0 + 19.0 + 20.0]
 
 
 @pytest.mark.parametrize("blocks", [1, 4, N])
 @pytest.mark.parametrize("last", [None, 100.0])
-def test_what_a_hook_raises_is_told_with_its_time(blocks, last):
+def test_exception_of_a_hook_is_reported_with_its_time(blocks, last):
     one = reduced(header(k=13.0), blocks, last)
     assert one.found() == {}
     assert one.failure == "own: at t = 5.5 s: ValueError: thirteen"
 
 
-def test_names_are_those_of_the_loop():
+def test_inputs_have_the_names_of_the_loop():
     fleet = AllocatedLoop("a.plant", "a.law", "a.planner", allocation="a.fins")
     of = header(loop=fleet)
     values = {str(name): value for name, value in of.parameters.items()}
     found = sources_of(reducer_with(), fleet, of.place, values)
     assert found.places == {"plant.x": 2, "plant.n": 1, "plant.is_on": 3}
-    # What gives tau has a state.
+    # With an allocation the applied signal follows from a state.
     assert found.constants == {"plant.mode": 3, "controller.k": 1.0, "plant.actuator.T.u": inf}
     assert fleet.port("plant.tau.u") == "a.fins.tau.u"
     assert fleet.port("sea.depth") == "sea.depth"
@@ -171,14 +170,14 @@ def test_names_are_those_of_the_loop():
     assert reductions_of([reducer_with()], [STANDARD], of) == {STANDARD: {}}
 
 
-def test_a_parameter_that_is_no_number_is_refused():
+def test_a_parameter_that_is_not_a_number_is_refused():
     with pytest.raises(InputError, match=r"controller\.k is 'soft', not a number"):
         reduced(header(k="soft"))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("order", ["feedthrough", "gauss-seidel"])
 @pytest.mark.parametrize("blocks", [1, 3])
-def test_compiled_indices_are_those_of_their_hooks_in_python(order, blocks, monkeypatch):
+def test_compiled_indices_equal_their_hooks_in_python(order, blocks, monkeypatch):
     reducers = [*dict.fromkeys(index.reducer for index in INDICES), *WATCHED]
     names = sorted({port.name for one in reducers for port in one.ports})
     signals = [name for name in names if name not in STANDARD.limits and name != STANDARD.ell]
@@ -203,9 +202,9 @@ def test_compiled_indices_are_those_of_their_hooks_in_python(order, blocks, monk
     assert repr(compiled) == repr(found())
 
 
-def test_what_is_compiled_is_found_without_translating_it_again(monkeypatch):
+def test_compiled_indices_are_found_without_translating_them_again(monkeypatch):
     [reducer] = {index.reducer for index in INDICES if index.name == "final_error"}
     if library_of(reducer) is None:
         pytest.skip("there is no C compiler")
-    monkeypatch.setattr(compiled_reducers, "_text", None)
+    monkeypatch.setattr(reduction, "_text", None)
     assert library_of.__wrapped__(reducer)

@@ -23,8 +23,8 @@ from orchestrator.cosim.formats.osp import write_osp
 from orchestrator.cosim.formats.ssp_reader import read_ssp
 from orchestrator.cosim.formats.ssp_writer import ssp_bytes, structure_xml, write_ssp
 from orchestrator.cosim.system import System
+from orchestrator.machine.disk import plain_file_names
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.machine.file_names import plain_file_names
 from support import small_fmus, typed
 from support.archives import (
     archive,
