@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING
 from orchestrator.machine.lazy import offered
 
 if TYPE_CHECKING:
-    from orchestrator.runs.loading import load
+    from orchestrator.runs.preparation import load
     from orchestrator.runs.result import Result, read
     from orchestrator.runs.run import simulate
     from orchestrator.studies.study_result import StudyResult
@@ -42,7 +42,7 @@ __all__ = ["Result", "StudyResult", "load", "read", "simulate", "sweep"]
 __getattr__, __dir__ = offered(
     __name__,
     {
-        "runs.loading": "load",
+        "runs.preparation": "load",
         "runs.result": "Result read",
         "runs.run": "simulate",
         "studies.study_result": "StudyResult",

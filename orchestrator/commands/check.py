@@ -16,8 +16,7 @@ from orchestrator.cosim import Component, binary_of, check_binary, read_componen
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
-from orchestrator.runs.loading import load_scenario, outdated
-from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
+from orchestrator.runs.preparation import FALLBACK_STOP_TIME, load_scenario, outdated, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study

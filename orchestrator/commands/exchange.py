@@ -32,8 +32,15 @@ from orchestrator.program.components import definitions_of
 from orchestrator.program.files import ProgramFiles, write_files
 from orchestrator.program.fmu import SystemModel, write_fmu
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.loading import brings_its_own, first_given, left_behind, load
-from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
+from orchestrator.runs.preparation import (
+    DEFAULT_STEP,
+    FALLBACK_STOP_TIME,
+    brings_its_own,
+    first_given,
+    left_behind,
+    load,
+    prepare,
+)
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import read_events, read_scenario
 

@@ -11,7 +11,7 @@ from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.commands.streams import FAILED, OK, say
 from orchestrator.cosim import Ending, System
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.request import Request, flags
 from orchestrator.runs.scenario import Scenario
 

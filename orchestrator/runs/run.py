@@ -44,8 +44,13 @@ from orchestrator.runs.folder import (
     publish,
     replace_files,
 )
-from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
-from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.preparation import (
+    Prepared,
+    check_brings_its_own,
+    load_scenario,
+    notes_as_warnings,
+    prepare,
+)
 from orchestrator.runs.request import (
     CHECKPOINT_EVERY,
     Files,

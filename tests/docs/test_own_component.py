@@ -23,7 +23,7 @@ from orchestrator.commands.main import main
 from orchestrator.cosim import Experiment
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.platforms import TARGETS
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.result import read_result
 from support.markdown import DOCS, blocks
 from support.patches import patch

@@ -9,8 +9,14 @@ import pytest
 
 from orchestrator.cosim import Connection, PortName, System, read_component
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import check_brings_its_own, is_path, left_behind, read_fmu
-from orchestrator.runs.preparation import DEFAULT_STEP, prepare
+from orchestrator.runs.preparation import (
+    DEFAULT_STEP,
+    check_brings_its_own,
+    is_path,
+    left_behind,
+    prepare,
+    read_fmu,
+)
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from support.archives import fmu, variable

@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from orchestrator.cosim import Alter, Connection, Freeze, Linear, Mapped, PortName, Set, System
 from orchestrator.machine.errors import InputError, Refused
-from orchestrator.runs.loading import load, load_scenario
-from orchestrator.runs.preparation import prepare
+from orchestrator.runs.preparation import load, load_scenario, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import (
     Difference,
