@@ -29,7 +29,6 @@ from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.result import (
     METRICS,
-    changed_files,
     companion_tables,
     read_metrics,
     read_record,
@@ -144,20 +143,12 @@ def _plot(options: argparse.Namespace) -> int:
     patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
-    for path in paths:
-        _warn(table_in(path))
     wanted = partial(wanted_columns, patterns=patterns)
     runs = _named([read_result(path, wanted) for path in paths], paths)
     figure = plot(told_apart(runs, paths), patterns)
     with _written(options.out, options.force) as folder:
         save(figure, folder / options.out.name)
     return OK
-
-
-def _warn(table: Path) -> None:
-    """Warn of files that were changed since the run wrote them."""
-    for file in changed_files(table):
-        say(f"warning: {file} was changed since the run wrote it")
 
 
 def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
@@ -188,8 +179,6 @@ def _view(options: argparse.Namespace) -> int:
     if out.suffix != ".html":
         raise InputError(f"{out}: must end with .html")
     files = [file, *companion_tables(file)[:1]]
-    for one in files:
-        _warn(one)
     runs = told_apart([read_result(one, _viewed) for one in files], files)
     record = read_record(file)
     title = str(record.get("title") or runs[0].label)
