@@ -19,23 +19,23 @@ from orchestrator.cosim import (
 )
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import is_folder
-from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, for_each, vehicle_names
+from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, for_each_vehicle
 
 _WIRING = Path(__file__).with_name("closed_loop.toml")
 
 
 def read_wiring(vehicles: int | None = None) -> dict[str, Any]:
-    """The content of `closed_loop.toml`, for each of several vehicles; None: for a single one."""
+    """Read `closed_loop.toml` for each of several vehicles; None: for a single one."""
     wiring = tomllib.loads(_WIRING.read_text(encoding="utf-8"))
     if vehicles is None:
         return wiring
-    names, each = vehicle_names(vehicles), f"{EACH_VEHICLE}."
+    each = f"{EACH_VEHICLE}."
     components = {each + name: fmu for name, fmu in wiring["components"].items()}
     wires = {each + target: source and each + source for target, source in wiring["wires"].items()}
     return {
         **wiring,
-        "components": for_each(EACH_VEHICLE, names, components),
-        "wires": for_each(EACH_VEHICLE, names, wires),
+        "components": for_each_vehicle(vehicles, components),
+        "wires": for_each_vehicle(vehicles, wires),
     }
 
 
