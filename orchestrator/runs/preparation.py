@@ -263,7 +263,7 @@ def left_behind(scenario: Scenario) -> str | None:
 
 
 def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
-    """Warn of what may be forgotten: inputs without a source, parameters of a vehicle.
+    """Warn of possible omissions: inputs without a source, parameters of a vehicle.
 
     Args:
         system: to be run.
@@ -342,7 +342,7 @@ class Prepared:
         return simulate_plan(self.plan, observers, self.isolation, self.stepping, [*hooks, *own])
 
     def doubts(self) -> list[str]:
-        """Warn of what may be forgotten: inputs without a source, parameters of a vehicle."""
+        """Warn of possible omissions: inputs without a source, parameters of a vehicle."""
         actions = [event.action for event in self.events]
         given = {*(self.input_table.targets if self.input_table else ())}
         given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}

@@ -1,7 +1,8 @@
 """Options of a run, each declared once: its type, its default and its help.
 
-The fields of these dataclasses are the options of the command line (`commands/options.py`), and
-those of :class:`Options` also keywords of `simulate`, with one help text for both.
+The fields of these dataclasses are the options of the command line (`commands/options.py`); the
+fields of :class:`Options` are also keywords of `simulate`, with the same help.
+
 """
 
 from __future__ import annotations
@@ -41,10 +42,10 @@ def option(
     """Declare a field of a dataclass as an option.
 
     Args:
-        default: its value where the user gives none.
+        default: its default.
         text: its help, on the command line and in Python.
-        is_flag: whether it is an option of the command line.
-        is_hashed: whether it counts in the hash of the object.
+        is_flag: True if it is an option of the command line.
+        is_hashed: True if it counts in the hash of the object.
         how: arguments of `add_argument` that do not follow from the type of the field.
 
     """
@@ -55,7 +56,7 @@ def option(
 
 
 def flags(declared: type[Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """The options of the command line among the fields of a dataclass.
+    """Find the options of the command line among the fields of a dataclass.
 
     Yields:
         The name of a field, its flag, and the arguments of `add_argument`.
@@ -71,7 +72,7 @@ def flags(declared: type[Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
 
 
 def _read_as(hint: Any) -> dict[str, Any]:
-    """The arguments of `add_argument` that follow from a type."""
+    """Derive the arguments of `add_argument` from a type."""
     for kind in [hint] if get_origin(hint) is Literal else get_args(hint) or [hint]:
         if kind is bool:
             return {"action": "store_true"}
@@ -89,8 +90,9 @@ def takes_keywords(
 ) -> Callable[[Callable[[T], R]], Callable[P, R]]:
     """Let a function of a dataclass take the fields of the dataclass as arguments.
 
-    Signature, type hints and docstring become those of a function with these arguments; in the
-    docstring, `{arguments}` stands for their help.
+    Its signature, type hints and docstring list these arguments; in the docstring, `{arguments}`
+    stands for their help.
+
     """
     hints, shown = get_type_hints(declared), signature(declared)
     texts = {one.name: one.metadata["help"] for one in fields(declared)}  # type: ignore[arg-type]
@@ -123,7 +125,7 @@ def takes_keywords(
     return decorate
 
 
-#: The help of options that not only runs have.
+#: Help of options that studies have, too.
 KIND = (
     "kind of the bundle's FMUs: python (source code) or native (its translation to C), with the "
     f"same numbers; default: {AUTO} (native if it is present or can be built)"
@@ -133,12 +135,14 @@ LOOP = (
     "available)"
 )
 FORCE = "rename your own files that are in the way to NAME.~1~; default: stop"
-CHECKPOINT_EVERY = "time between checkpoints [simulated s]; default: none, or as before if resumed"
+CHECKPOINT_EVERY = (
+    "time between checkpoints [simulated s]; default: none; for a resumed run, the same again"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Options of every run; None: as the scenario has it."""
+    """Options of every run; None: the scenario's."""
 
     stop_time: float | None = option(None, "end of the run [s]; default: the scenario's")
     step: float | None = option(
@@ -195,11 +199,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Request(Options):
-    """A scenario, and what the user changes of it.
+    """A scenario, and the user's changes.
 
     Attributes:
-        scenario: its name, or the path of a file; empty where a system is given instead.
-        parameters: values in place of the scenario's, by `component.parameter`.
+        scenario: its name, or the path of a file; empty if a system is given instead.
+        parameters: values that replace the scenario's, by `component.parameter`.
 
     """
 
@@ -208,7 +212,7 @@ class Request(Options):
 
     @property
     def label(self) -> str:
-        """Its words after `auv-fmu run`, then in parentheses what the command line has not."""
+        """Words after `auv-fmu run`; in parentheses, changes that the command line cannot make."""
         words = [self.scenario]
         rest = {"steps": ", ".join(f"{name} = {_text(h)} s" for name, h in self.steps.items())}
         for name, flag, how in flags(Request):
@@ -216,7 +220,7 @@ class Request(Options):
             if value == how["default"]:
                 continue
             if name == "events" and not isinstance(value, str):
-                # Tables; the option takes the scenario that has them.
+                # The option takes the name of a scenario, not tables.
                 rest[name] = ", ".join(map(str, value)) or "none"
                 continue
             words.append(flag)
@@ -230,10 +234,10 @@ class Request(Options):
 
 @dataclass(frozen=True)
 class Files:
-    """Files of a run, and what is only for a run that writes files.
+    """Options of a run that writes files.
 
     Raises:
-        InputError: an interval or a factor makes no sense.
+        InputError: an interval or a factor is not positive.
 
     """
 
@@ -264,7 +268,7 @@ class Files:
 
 
 def _text(value: Any) -> str:
-    """The shortest text that is read back as the same value."""
+    """Return the shortest text that is read back as the same value."""
     if isinstance(value, str | Path):
         return str(value)
     return literal(value).removesuffix(".0") if isinstance(value, float) else literal(value)

@@ -336,7 +336,7 @@ def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
 
 
 def _number(value: float) -> str:
-    """Four digits, with an exponent for very small and very large numbers."""
+    """Four digits, with an exponent for numbers below 1e-4 and from 1e7 on."""
     if value and not 1e-4 <= abs(value) < 1e7:
         return f"{value:.3e}"
     return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")

@@ -433,7 +433,7 @@ def _figures(prepared: Prepared) -> list[str]:
 
 
 def _places(runs: Sequence[Prepared]) -> tuple[list[str], list[str]]:
-    """Name the folder of each run below that of the first, and all files that are known before."""
+    """Name the folder of each run below the first, and all files that are known before."""
     files = _figures(runs[0])
     taken = [*FILES, _certificates(""), *files, CHECKPOINTS, INCOMPLETE, LEDGER]
     below = ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
@@ -557,7 +557,7 @@ def leave_checkpoints(
     kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
 ) -> None:
     """Remove the checkpoints of runs that belong together if all are complete, else name them."""
-    # The folder of the first contains those of the others.
+    # The first folder contains the others.
     for checkpoints in reversed(kept):
         if is_whole:
             checkpoints.remove()
