@@ -5,7 +5,7 @@
     result.plot("plant.eta.*")
 
 ==================  ==========================================================
-room                what it is for
+room                contents
 ==================  ==========================================================
 :mod:`.machine`     the operating system: errors, files, processes, compilers
 :mod:`.cosim`       a co-simulation master for any system of FMUs
@@ -16,12 +16,12 @@ room                what it is for
 :mod:`.live`        the page in which a system runs
 :mod:`.exchange`    other tools: hosts, verification of their tables
 :mod:`.studies`     many runs
-:mod:`.paper`       the paper's numbers and claims beside ours
+:mod:`.paper`       the paper's numbers and claims compared with ours
 :mod:`.commands`    the command line
 ==================  ==========================================================
 
-Each imports only what stands above it in this table. Components are known as FMUs behind their
-ports; what stands above `vehicle` knows none of them by name.
+Each imports only rooms above it in this table. Components are used as FMUs through their ports;
+rooms above `vehicle` contain no name of a component.
 """
 
 from __future__ import annotations

@@ -47,18 +47,18 @@ from orchestrator.runs.scenario import read_events, read_scenario
 #: Formats of an export.
 EXPORT_FORMATS = SSP, OSP, FMU, C = "ssp", "osp", "fmu", "c"
 
-#: Options of `export` that are for one format only.
+#: Options of `export` that apply to one format only.
 _OF_FORMAT = {"flat": SSP, "connectors": SSP, "platforms": FMU, "single": C}
 
-#: Tools that do not set parameters of a type.
+#: Tools that do not set parameters of a type, by the type.
 _LEAVING = {"Enumeration": "libcosim and ecos", "String": "OMSimulator and others"}
 
-#: Options of `verify` that are for a table only.
+#: Options of `verify` that apply to tables only.
 _OF_TABLES = ("scenario", "step", "order", "initial", "events", "set")
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu export`."""
+    """Add the options of `auv-fmu export`."""
     describe(
         parser,
         "Write a scenario for other tools: its FMUs, connections and parameters, or all of it as "
@@ -101,7 +101,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
 
 
 def add_release(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu release`."""
+    """Add the options of `auv-fmu release`."""
     describe(
         parser,
         "Write the archives of a release: every FMU, for all platforms.",
@@ -113,7 +113,7 @@ def add_release(parser: argparse.ArgumentParser) -> None:
 
 
 def add_hosts(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu hosts`."""
+    """Add the options of `auv-fmu hosts`."""
     describe(
         parser,
         "Run a scenario in other co-simulation tools and compare their results with auv-fmu's.",
@@ -138,7 +138,7 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu verify`."""
+    """Add the options of `auv-fmu verify`."""
     describe(
         parser,
         "Compare a table from another tool with a run of the same scenario, or run the reference "
@@ -317,7 +317,7 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
 
 
 def _verify_carried(options: argparse.Namespace) -> int:
-    """Verify an FMU by the results that it carries; all of them must agree."""
+    """Compare an FMU with the results that it carries; all of them must agree."""
     carried = Carried(options.table, options.verbose)
     show(f"{options.table.name}: FMI-LS-REF {carried.version}")
     for note in carried.notes:

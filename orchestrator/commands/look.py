@@ -37,7 +37,7 @@ from orchestrator.runs.result import (
 )
 from orchestrator.vehicle.signals import Loop, loops_of
 
-#: The scenario that a live page opens unless another is named.
+#: Default scenario of a live page.
 _OPENED = "fig4"
 
 #: Formats of a plot.
@@ -45,7 +45,7 @@ _PLOTS = (".png", ".svg", ".pdf")
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu plot`."""
+    """Add the options of `auv-fmu plot`."""
     describe(
         parser,
         "Plot signals of stored results over time. Several results share the axes.",
@@ -63,7 +63,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
 
 
 def add_view(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu view`."""
+    """Add the options of `auv-fmu view`."""
     describe(
         parser,
         "Write one self-contained page that plays a stored result: the paths of its vehicles in "
@@ -76,7 +76,7 @@ def add_view(parser: argparse.ArgumentParser) -> None:
 
 
 def add_live(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu live`."""
+    """Add the options of `auv-fmu live`."""
     describe(
         parser,
         "Write one self-contained page in which the closed loop runs in the browser: change gains, "
@@ -96,7 +96,7 @@ def add_live(parser: argparse.ArgumentParser) -> None:
 
 
 def add_animate(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu animate`."""
+    """Add the options of `auv-fmu animate`."""
     describe(
         parser,
         "Run a scenario and write a film of the vehicle with its errors and commands; for several "
@@ -124,7 +124,7 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
 
 
 def _size(text: str) -> tuple[int, int]:
-    """Width and height, with an x between them."""
+    """Read a width and a height with an x between them."""
     width, _, height = text.partition("x")
     if not (width.isdecimal() and height.isdecimal()):
         raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT")
@@ -152,7 +152,7 @@ def _plot(options: argparse.Namespace) -> int:
 
 
 def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
-    """Runs by their labels, or by their scenarios if labels are missing or the same."""
+    """Label runs by their labels, or by their scenarios if labels are missing or the same."""
     records = [read_record(table_in(path)) for path in paths]
     labels = {record.get("label") for record in records} - {"", None}
     if len(labels) == len(runs):
@@ -164,7 +164,7 @@ def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
 
 
 def _is_there(text: str) -> bool:
-    """Tell whether there is such a file or folder; a text that is no path names none."""
+    """Tell whether there is such a file or folder."""
     with suppress(OSError):
         return Path(text).exists()
     return False
@@ -200,7 +200,7 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _viewed(columns: Sequence[str], loops: Sequence[Loop]) -> Collection[str]:
-    """The columns whose extremes are kept: of vehicles what is drawn, or all."""
+    """Choose the columns whose extremes are kept: the drawn ones of vehicles, or all."""
     drawn = {name for loop in loops for name in loop.drawn()}
     return drawn if drawn.intersection(columns) else columns
 
@@ -239,7 +239,7 @@ def _animate(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _written(file: Path, force: bool) -> Iterator[Path]:
-    """Give a folder to write a file into, move the file to its own folder, and show its path."""
+    """Provide a folder to write a file into, move the file to its own folder, and show its path."""
     with replace_files(file.parent, [file.name], force=force) as unfinished:
         yield unfinished
     show(file)
