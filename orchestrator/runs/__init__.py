@@ -1,7 +1,7 @@
 """One run: scenarios, the wiring of the closed loop, the bundle, result folders.
 
-A `scenario` becomes a system by `wiring`, a run by `preparation`, and rows by `run`, in memory or in
-a folder. A `result` contains the rows, the indices and the record.
+A `scenario` becomes a system by `wiring`, a run by `preparation`, and rows by `run`, in memory or
+in a folder. A `result` contains the rows, the indices and the record.
 
 """
 
