@@ -65,8 +65,12 @@ class Form(TypedDict, total=False):
 
 def words_of(form: Form) -> list[str]:
     """Return the options of the build for a form."""
-    texts = {name: value for name, value in form.items() if isinstance(value, str)}
-    words = [word for name, value in texts.items() for word in (f"--{name}", value)]
+    words = [
+        word
+        for name, value in form.items()
+        if isinstance(value, str)
+        for word in (f"--{name}", value)
+    ]
     return words + ["--arrays"] * form.get("arrays", False)
 
 
@@ -181,8 +185,9 @@ def _best_fmus(fmi: str) -> Path:
     if fmi != FMI_VERSIONS[0]:
         # The Python kind has only the first.
         return current_fmus(NATIVE, fmi)
-    if found := _kept(key_of(NATIVE, fmi)):
-        return found
+    for path in read_cached(CATEGORY, key_of(NATIVE, fmi)):
+        # They were built earlier.
+        return path.parent
     try:
         compiler_for(platforms(fmi))
     except (OSError, ValueError):
@@ -199,11 +204,6 @@ def _best_fmus(fmi: str) -> Path:
 def key_of(kind: str, fmi: str) -> str:
     """Cache key of the FMUs of the installed sources."""
     return sha256(f"{kind} {fmi} {fingerprint(kind)}".encode()).hexdigest()[:16]
-
-
-def _kept(key: str) -> Path | None:
-    """Folder of FMUs that were built earlier."""
-    return next((path.parent for path in read_cached(CATEGORY, key)), None)
 
 
 def _built(*options: str) -> dict[str, bytes]:

@@ -281,9 +281,10 @@ def _digest_in(folder: Path, name: str) -> str | None:
 
 def _files_in(folder: Path) -> list[str]:
     """Names of the files in a folder that are not reached by links."""
+    if folder.is_symlink():
+        return []
     names = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*"))]
-    is_plain = not folder.is_symlink()
-    return [n for n in names if is_plain and not _has_link(folder, n) and (folder / n).is_file()]
+    return [name for name in names if (folder / name).is_file() and not _has_link(folder, name)]
 
 
 def _content(path: Path) -> _Content | None:
@@ -450,8 +451,9 @@ def publish(ledger: Ledger) -> Path:
 
 def place_of(ledger: Ledger) -> Path:
     """Return the folder for the staged result: a failed one does not replace a complete one."""
-    has_complete = (ledger.folder / RECORD).is_file() and not _failure(ledger.folder)
-    return _beside(ledger.folder) if has_complete and _failure(ledger.staging) else ledger.folder
+    staged, earlier = _record(ledger.staging), _record(ledger.folder)
+    has_complete = (ledger.folder / RECORD).is_file() and not earlier.get("failure")
+    return _beside(ledger.folder) if has_complete and staged.get("failure") else ledger.folder
 
 
 def _beside(folder: Path) -> Path:
@@ -469,17 +471,8 @@ def _record(folder: Path) -> dict[str, Any]:
     return record if isinstance(record, dict) else {}
 
 
-def _failure(folder: Path) -> object:
-    return _record(folder).get("failure")
-
-
 def inner_folder(folder: Path, *names: str) -> Path:
-    """Return a folder within another one.
-
-    Raises:
-        InputError: a link leads to it, which could lead anywhere.
-
-    """
+    """Return a folder within another one, unless a link leads to it, perhaps elsewhere."""
     for name in names:
         folder /= name
         if folder.is_symlink():

@@ -113,15 +113,10 @@ def load(
 
 
 def warn_of(findings: Findings, notes: Sequence[str], stacklevel: int = 3) -> None:
-    """Add notes to findings, and give all notes as Python's warnings.
-
-    Args:
-        findings: of a file.
-        notes: further ones.
-        stacklevel: of the warnings; by default, they are for the caller of the caller.
+    """Add notes to findings and give all as Python's warnings, for the caller of the caller.
 
     Raises:
-        Refused: there are problems.
+        Refused: the findings have problems.
 
     """
     for note in notes:
@@ -243,12 +238,7 @@ def brings_its_own(name: str) -> bool:
 
 
 def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
-    """Check that no kind of FMU is requested of a system that contains its own FMUs.
-
-    Raises:
-        InputError: the request would not have any effect.
-
-    """
+    """Check that no kind of FMU is requested of a system that contains its own FMUs."""
     if kind == NATIVE or fmi != FMI_VERSIONS[0]:
         raise InputError(f"{name}: brings its own FMUs; kind and fmi apply only to the bundle's")
 
@@ -265,9 +255,7 @@ def left_behind(scenario: Scenario) -> str | None:
 def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
     """Warn of possible omissions: inputs without a source, parameters of a vehicle.
 
-    Args:
-        system: to be run.
-        given: inputs that get their values elsewhere.
+    `given` are inputs that get their values from events or tables.
 
     """
     if len(system.components) == 1:
@@ -327,11 +315,7 @@ class Prepared:
         return self.plan.identity(self.events, inputs)
 
     def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
-        """Make the run.
-
-        Args:
-            observers: take its rows.
-            hooks: act on it before its table of inputs and its events do.
+        """Make the run; `hooks` act before its table of inputs and its events do.
 
         Raises:
             InputError: an FMU or a parameter is not usable; nothing was stepped.

@@ -122,14 +122,7 @@ class Result(Table):
     def __init__(
         self, scenario: Scenario, loops: Sequence[Loop], prepared: Prepared | None = None
     ) -> None:
-        """Begin without rows.
-
-        Args:
-            scenario: of the run, for its figures.
-            loops: of its vehicles.
-            prepared: the run, if it is made in this process.
-
-        """
+        """Begin without rows; `prepared` is the run, if it is made in this process."""
         super().__init__()
         self.resumed_at: float | None = None
         self._scenario, self._loops, self._clock = scenario, loops, Stopwatch()
@@ -387,7 +380,7 @@ def write_record(
     clock: Stopwatch,
     remarks: Mapping[str, object] | None = None,
 ) -> None:
-    """Write the indices and the record of a run into the folder with its other files.
+    """Write the indices and the record of a run, the last files of its folder.
 
     Args:
         folder: with all other files of the result.

@@ -206,14 +206,14 @@ class WrittenRun:
         columns: Sequence[str] | None,
         checkpoints: Checkpoints | None,
     ) -> None:
-        """Open its files.
+        """Open the files in a folder.
 
         Args:
-            folder: of its files.
+            folder: of the files.
             prepared: the run.
-            files: the files to write.
+            files: options of the files.
             columns: of its table; None: all.
-            checkpoints: that it writes and continues from; None: there are none.
+            checkpoints: to write and to continue from; None: there are none.
 
         """
         self.folder, self.prepared, loops = folder, prepared, prepared.loops
@@ -449,12 +449,15 @@ def _certificates(vehicle: str) -> str:
 
 
 def selected_columns(system: System, wanted: str, is_companion: bool = False) -> list[str] | None:
-    """Choose the columns of a table; None: all.
+    """Choose the columns of a table by `all`, `outputs`, or patterns with commas between them.
 
     Args:
         system: the system of the run.
-        wanted: `all`, `outputs`, or patterns with commas between them.
+        wanted: the choice.
         is_companion: True if patterns may match nothing, because another run has the columns.
+
+    Returns:
+        Their names; None: all.
 
     Raises:
         InputError: a pattern matches no column.
@@ -539,12 +542,7 @@ def checkpoints_of(
 
 
 def check_gives_states(system: System) -> None:
-    """Check that all FMUs provide their state.
-
-    Raises:
-        InputError: one does not.
-
-    """
+    """Check that all FMUs provide their state."""
     for name, component in system.components.items():
         if not component.gives_state:
             raise InputError(

@@ -152,12 +152,7 @@ class Inputs:
 
 
 def _stand_in(name: str, variable: Variable, strings: StringTable, value: object) -> float:
-    """Return the number that stands for a cell of a table.
-
-    Raises:
-        ValueError: the variable cannot have this value.
-
-    """
+    """Return the number that stands for a cell of a table; a ValueError names a wrong value."""
     try:
         return strings.stand_in(variable.typed(variable.cell(value, f"{name}:"), name))
     except InputError as error:
@@ -247,12 +242,7 @@ def scenario_of(content: Mapping[str, Any]) -> Scenario:
 
 
 def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
-    """Check what does not depend on the system.
-
-    Raises:
-        Refused: one of the tables is not an event.
-
-    """
+    """Check tables of events without a system."""
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
 
     ScenarioFile.check(where, {"events": list(tables)})
@@ -347,9 +337,7 @@ def with_input_table(
 
     Args:
         system: with the inputs.
-        names: of the inputs.
-        times: of their values [s].
-        columns: values of each input, in its type or as doubles.
+        names, times, columns: of the inputs; columns have the types of the inputs, or doubles.
         given: ports whose values come from the same file or command; the table must not name them.
         between: interpolation of continuous Real inputs between two rows.
 
@@ -563,14 +551,8 @@ def _ports(
 ) -> list[PortName]:
     """Return the port of a name, or the ports of a group; a star stands for several components.
 
-    Args:
-        system: with the ports.
-        text: `component.port` or `component.group`.
-        causalities: allowed ones.
-        single: True if the name must be the name of one port.
-
     Raises:
-        InputError: there is none.
+        InputError: there is none with one of the causalities, or, if `single`, there are several.
 
     """
     several = system.meant(PortName.read(text))
