@@ -35,7 +35,7 @@ from orchestrator.runs.result import (
     read_result,
     table_in,
 )
-from orchestrator.vehicle.signals import Loop, loops_of
+from orchestrator.vehicle.signals import Loop
 
 #: Default scenario of a live page.
 _OPENED = "fig4"
@@ -224,7 +224,7 @@ def _animate(options: argparse.Namespace) -> int:
     film = Film(options.fps, options.size, options.speed)
     film.check(out)
     prepared = prepare(scenario, system, request(options))
-    loops = loops_of(prepared.system)
+    loops = prepared.loops
     seen = VisibleRows({name for loop in loops for name in loop.drawn()})
     observers: list[Observer] = [seen, Progress(scenario.name)]
     run = Drawn(scenario.name, seen, scenario.z_up, loops)

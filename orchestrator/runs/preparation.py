@@ -48,7 +48,7 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import Identity
 from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.request import Request
+from orchestrator.runs.request import Request, SimulateOptions
 from orchestrator.runs.scenario import (
     Inputs,
     Scenario,
@@ -349,14 +349,14 @@ def prepare_request(request: Request) -> Prepared:
     return prepare(*load_scenario(request.scenario, request.kind), request)
 
 
-def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
+def prepare(scenario: Scenario, system: System, request: Request | SimulateOptions) -> Prepared:
     """Apply a request to a scenario and its system.
 
     Raises:
         InputError: the request cannot be met.
 
     """
-    findings, values = Findings(request.strict), system.expanded(request.parameters)
+    findings, values = Findings(request.strict), system.expanded(request.parameters or {})
     system = system.with_parameters(values)
     if request.inputs is not None:
         scenario = replace(scenario, inputs=Inputs(Path(request.inputs), wins=True))
@@ -373,7 +373,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     stop_time = first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: has no stop time; set one with --stop-time")
-    system = replace(system, steps={**system.steps, **request.steps})
+    system = replace(system, steps={**system.steps, **(request.steps or {})})
     step = first_given(request.step, scenario.step, system.step)
     if step is None:
         system = system.with_common_step()

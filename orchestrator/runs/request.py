@@ -10,7 +10,7 @@ from __future__ import annotations
 import shlex
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import KW_ONLY, dataclass, field, fields
 from functools import wraps
 from inspect import signature
 from pathlib import Path
@@ -27,6 +27,7 @@ from orchestrator.cosim import (
     Order,
     RealTime,
     Selection,
+    System,
     TableFormat,
 )
 from orchestrator.machine.texts import literal
@@ -230,6 +231,38 @@ class Request(Options):
             words += ["--set", f"{name}={_text(value)}"]
         added = "; ".join(f"{name}: {text}" for name, text in rest.items() if text)
         return shlex.join(words) + f" ({added})" * bool(added)
+
+
+@dataclass(frozen=True)
+class SimulateOptions(Options):
+    """Arguments of :func:`.run.simulate`."""
+
+    system: str | Path | Mapping[str, Any] | System = field(
+        metadata={
+            "help": "name of a scenario, path of a file such as .toml or .ssp, a dictionary with "
+            "the entries of a scenario file, or a system from `load`"
+        }
+    )
+    parameters: Mapping[str, object] | None = option(
+        None,
+        "values in place of the scenario's, by `component.parameter`: numbers, Booleans, names, or "
+        "text as on the command line; for a group, such as `plant.eta0`, a list with a value for "
+        "each member",
+    )
+    _: KW_ONLY
+    progress: bool = option(False, "show a bar on runs that take longer than some seconds")
+    variant: str | None = option(None, "name of a system description in an SSP")
+    checkpoint: str | Path | None = option(
+        None,
+        "folder for checkpoints, from which another process can continue the run; it is removed "
+        "when the run is complete",
+    )
+    checkpoint_every: float | None = option(None, CHECKPOINT_EVERY)
+    resume: bool = option(
+        False,
+        "continue from the last checkpoint. The result has all rows, as if the run had not been "
+        "interrupted; its `resumed_at` has the time at which it continued",
+    )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import os
 import signal
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import KW_ONLY, dataclass, field, fields, replace
+from dataclasses import replace
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
@@ -52,11 +52,8 @@ from orchestrator.runs.preparation import (
     warn_of,
 )
 from orchestrator.runs.request import (
-    CHECKPOINT_EVERY,
     Files,
-    Options,
-    Request,
-    option,
+    SimulateOptions,
     takes_keywords,
 )
 from orchestrator.runs.result import FILES, Result, Stopwatch, write_record
@@ -81,38 +78,6 @@ _FAILED = 1
 
 
 # Runs in memory
-
-
-@dataclass(frozen=True)
-class SimulateOptions(Options):
-    """Arguments of :func:`simulate`."""
-
-    system: str | Path | Mapping[str, Any] | System = field(
-        metadata={
-            "help": "name of a scenario, path of a file such as .toml or .ssp, a dictionary with "
-            "the entries of a scenario file, or a system from `load`"
-        }
-    )
-    parameters: Mapping[str, object] | None = option(
-        None,
-        "values in place of the scenario's, by `component.parameter`: numbers, Booleans, names, or "
-        "text as on the command line; for a group, such as `plant.eta0`, a list with a value for "
-        "each member",
-    )
-    _: KW_ONLY
-    progress: bool = option(False, "show a bar on runs that take longer than some seconds")
-    variant: str | None = option(None, "name of a system description in an SSP")
-    checkpoint: str | Path | None = option(
-        None,
-        "folder for checkpoints, from which another process can continue the run; it is removed "
-        "when the run is complete",
-    )
-    checkpoint_every: float | None = option(None, CHECKPOINT_EVERY)
-    resume: bool = option(
-        False,
-        "continue from the last checkpoint. The result has all rows, as if the run had not been "
-        "interrupted; its `resumed_at` has the time at which it continued",
-    )
 
 
 @takes_keywords(SimulateOptions)
@@ -145,12 +110,11 @@ def simulate(options: SimulateOptions) -> Result:
             system, options.kind, variant=options.variant, findings=findings
         )
         findings.refuse()
-    parameters = {} if options.parameters is None else options.parameters
-    if not isinstance(parameters, Mapping):
-        raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
-    changes = {one.name: getattr(options, one.name) for one in fields(Options)}
-    changes["steps"] = options.steps or {}
-    prepared = prepare(scenario, system, Request("", parameters, **changes))
+    if not isinstance(options.parameters, Mapping | None):
+        raise InputError(
+            f"parameters: a mapping by component.parameter, not {options.parameters!r}"
+        )
+    prepared = prepare(scenario, system, options)
     warn_of(findings, [] if options.system is system else prepared.doubts(), _STACK_LEVEL)
     result = Result(scenario, prepared.loops, prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * options.progress)]
