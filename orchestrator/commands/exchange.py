@@ -236,27 +236,25 @@ def _export(options: argparse.Namespace) -> int:
                 "leave as they are in the FMU"
             )
     folder = options.out or Path("exports", prepared.scenario.stem)
-    with replace_files(folder, force=options.force) as unfinished:
+    with replace_files(folder, force=options.force) as staging:
         if options.format == FMU:
             definitions = definitions_of(system)
             model = SystemModel(
                 prepared.plan, definitions, system.name, prepared.scenario.title or system.name
             )
-            written = write_fmu(model, unfinished, options.fmi, options.platforms, say)
+            written = write_fmu(model, staging, options.fmi, options.platforms, say)
         elif options.format == C:
             title = prepared.scenario.title or system.name
             program = ProgramFiles(
                 prepared.plan, definitions_of(system), prepared.scenario.stem, title, options.single
             )
-            written = write_files(program, unfinished)
+            written = write_files(program, staging)
         elif options.format == OSP:
-            written = write_osp(system, unfinished)
+            written = write_osp(system, staging)
         else:
-            written = write_ssp(
-                system, unfinished, flat=options.flat, connectors=options.connectors
-            )
+            written = write_ssp(system, staging, flat=options.flat, connectors=options.connectors)
     for path in written:
-        show(folder / path.relative_to(unfinished))
+        show(folder / path.relative_to(staging))
     return OK
 
 

@@ -179,13 +179,13 @@ def _view(options: argparse.Namespace) -> int:
     if out.suffix != ".html":
         raise InputError(f"{out}: must end with .html")
     files = [file, *companion_tables(file)[:1]]
-    runs = told_apart([read_result(one, _viewed) for one in files], files)
+    runs = told_apart([read_result(table, _viewed) for table in files], files)
     record = read_record(file)
     title = str(record.get("title") or runs[0].label)
     # A title may name all runs that a scenario compares.
     if (label := record.get("label")) and len(files) == 1:
         title += f" (shown: {label})"
-    indices = [one.with_name(METRICS) for one in files]
+    indices = [table.with_name(METRICS) for table in files]
     stored = [
         Stored(run, read_metrics(path) if path.is_file() else {})
         for run, path in zip(runs, indices, strict=True)
@@ -240,6 +240,6 @@ def _animate(options: argparse.Namespace) -> int:
 @contextmanager
 def _written(file: Path, force: bool) -> Iterator[Path]:
     """Provide a folder to write a file into, move the file to its own folder, and show its path."""
-    with replace_files(file.parent, [file.name], force=force) as unfinished:
-        yield unfinished
+    with replace_files(file.parent, [file.name], force=force) as staging:
+        yield staging
     show(file)

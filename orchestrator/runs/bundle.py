@@ -96,23 +96,23 @@ def build_bundle(
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    with replace_files(folder, (ARCHIVE, MANIFEST, CHECKSUMS), force=force) as unfinished:
+    with replace_files(folder, (ARCHIVE, MANIFEST, CHECKSUMS), force=force) as staging:
         # FMUs that are up to date are kept.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
-                shutil.copy2(path, unfinished)
-        run_fmus("build", unfinished, *words_of(form), hear=hear)
-        files = sorted(unfinished.glob("*.fmu"))
+                shutil.copy2(path, staging)
+        run_fmus("build", staging, *words_of(form), hear=hear)
+        files = sorted(staging.glob("*.fmu"))
         if not form.get("arrays"):
-            archive = unfinished / ARCHIVE
-            archive.write_bytes(ssp_bytes(closed_loop(unfinished)))
+            archive = staging / ARCHIVE
+            archive.write_bytes(ssp_bytes(closed_loop(staging)))
             files.append(archive)
-        write_checksums(unfinished, files)
-        for path in unfinished.iterdir():
+        write_checksums(staging, files)
+        for path in staging.iterdir():
             before = folder / path.name
             if before.is_file() and before.read_bytes() == path.read_bytes():
                 path.unlink()
-        written = sorted(path.name for path in unfinished.iterdir())
+        written = sorted(path.name for path in staging.iterdir())
     return [folder / name for name in written]
 
 

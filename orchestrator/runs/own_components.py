@@ -124,11 +124,11 @@ def _write(folder: Path, texts: Mapping[str, str], names: Mapping[str, str]) -> 
     """Write texts into a new folder, and replace names in them."""
     if folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder}: is not empty; choose a new or empty folder")
-    with replace_files(folder, texts) as unfinished:
+    with replace_files(folder, texts) as staging:
         for target, text in texts.items():
             for name, own in names.items():
                 text = text.replace(name, own)
-            (unfinished / target).write_text(text, encoding="utf-8")
+            (staging / target).write_text(text, encoding="utf-8")
     return [folder / target for target in texts]
 
 
@@ -191,8 +191,8 @@ def build_own(
             gone = f"; {', '.join(removed)} of an earlier build is removed" * bool(removed)
             raise InputError(f"{error}{gone}") from None
         [built] = temporary.glob("*.fmu")
-        with replace_files(place, [built.name], force=force) as unfinished:
-            shutil.copyfile(built, unfinished / built.name)
+        with replace_files(place, [built.name], force=force) as staging:
+            shutil.copyfile(built, staging / built.name)
     return place / built.name
 
 

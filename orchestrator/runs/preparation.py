@@ -327,10 +327,11 @@ class Prepared:
 
     def doubts(self) -> list[str]:
         """Warn of possible omissions: inputs without a source, parameters of a vehicle."""
-        actions = [event.action for event in self.events]
         given = {*(self.input_table.targets if self.input_table else ())}
-        given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
-        given |= {port for one in actions if isinstance(one, Set) for port, _ in one.inputs}
+        for action in (event.action for event in self.events):
+            values = action.values if isinstance(action, Alter) else ()
+            values = action.inputs if isinstance(action, Set) else values
+            given |= {port for port, _ in values}
         return doubts_of(self.system, given)
 
     def missed(self, ending: Ending) -> list[Event]:

@@ -64,12 +64,11 @@ def flags(declared: type[Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
 
     """
     hints = get_type_hints(declared)
-    for one in fields(declared):
-        if one.metadata.get("is_flag"):
-            how = {**_read_as(hints[one.name]), **one.metadata["how"]}
-            text = one.metadata["help"]
-            flag = "--" + one.name.replace("_", "-")
-            yield one.name, flag, {"default": one.default, "help": text, **how}
+    for name, entry in declared.__dataclass_fields__.items():
+        if entry.metadata.get("is_flag"):
+            how = {**_read_as(hints[name]), **entry.metadata["how"]}
+            flag = "--" + name.replace("_", "-")
+            yield name, flag, {"default": entry.default, "help": entry.metadata["help"], **how}
 
 
 def _read_as(hint: Any) -> dict[str, Any]:
@@ -96,13 +95,13 @@ def takes_keywords(
 
     """
     hints, shown = get_type_hints(declared), signature(declared)
-    texts = {one.name: one.metadata["help"] for one in fields(declared)}  # type: ignore[arg-type]
+    texts = {entry.name: entry.metadata["help"] for entry in fields(declared)}  # type: ignore[arg-type]
     described, parameters = [], []
-    for name, one in shown.parameters.items():
+    for name, parameter in shown.parameters.items():
         described.append(textwrap.fill(f"{name}: {texts[name]}.", 92, subsequent_indent=" " * 4))
         # A dataclass shows a placeholder for a new mapping.
-        default = {} if repr(one.default) == "<factory>" else one.default
-        parameters.append(one.replace(annotation=hints[name], default=default))
+        default = {} if repr(parameter.default) == "<factory>" else parameter.default
+        parameters.append(parameter.replace(annotation=hints[name], default=default))
 
     def decorate(function: Callable[[T], R]) -> Callable[P, R]:
         arguments = textwrap.indent("\n".join(described), " " * 8).lstrip()

@@ -563,9 +563,9 @@ def _stored(path: Path) -> tuple[Path, dict[str, Any], Header, Iterator[np.ndarr
 
     """
     file = table_in(path)
-    for one in (file, file.with_name(RECORD)):
-        if locate(one).is_file() and is_changed(one):
-            warnings.warn(f"{one} was changed since the run wrote it", stacklevel=3)
+    for written in (file, file.with_name(RECORD)):
+        if locate(written).is_file() and is_changed(written):
+            warnings.warn(f"{written} was changed since the run wrote it", stacklevel=3)
     record, place = read_record(file), locate(file)
     columns = read_columns(place)
     header = header_in(record, columns) if record else None
@@ -600,8 +600,8 @@ def companion_tables(table: Path) -> list[Path]:
     """Find the tables of the runs that a result is compared with, in folders below its own."""
     names = (Path(str(name)) for name in read_record(table).get("files", ()))
     below = (name for name in names if len(name.parts) == 2 and name.name in TABLES)
-    found = (table.parent / name for name in below if name.parent.name not in ("", ".."))
-    return [file for file in found if file.is_file() and not file.parent.is_symlink()]
+    files = (table.parent / name for name in below if name.parent.name not in ("", ".."))
+    return [file for file in files if file.is_file() and not file.parent.is_symlink()]
 
 
 def read_record(table: Path) -> dict[str, Any]:

@@ -184,13 +184,13 @@ class WrittenRun:
         self.name, self.ending, self.metrics = prepared.scenario.name, Ending(), dict[str, Any]()
         # Without figures only references are compared.
         self.seen = VisibleRows(
-            {name for one in loops for name in (one.y_d if files.no_figures else one.drawn())}
+            {name for loop in loops for name in (loop.y_d if files.no_figures else loop.drawn())}
         )
         self._watch, self._metrics = Watch(loops), Metrics(loops)
         self._table = TABLE_FORMATS[files.format](folder / f"result.{files.format}")
         self._real_time = None if files.real_time is None else RealTime(files.real_time)
         self._resumed_at = checkpoints and checkpoints.time
-        self._hooks: list[Hook] = [one for one in (checkpoints, self._real_time) if one]
+        self._hooks: list[Hook] = [hook for hook in (checkpoints, self._real_time) if hook]
         self._observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
             *(

@@ -362,7 +362,7 @@ def with_input_table(
             _typed(variable, target, value)
     # In FMI, discrete variables change only at events.
     steady = ("Real", "continuous", "linear")
-    linear = [(one.family, one.variability, between) == steady for one in variables]
+    linear = [(v.family, v.variability, between) == steady for v in variables]
     input_table = InputTable.of(targets, times, columns, linear)
     start = system.start_time or 0.0
     row = input_table.at(start, int((times <= start).sum()) - 1)

@@ -122,8 +122,8 @@ def records(
 def places_of_time(names: Sequence[str]) -> list[int]:
     """Return the indices of the time columns."""
     lowered = [name.strip().lower() for name in names]
-    found = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
-    return next(filter(None, found), [])
+    places = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
+    return next(filter(None, places), [])
 
 
 def time_of(row: Sequence[str], clocks: Sequence[int], where: str) -> float:
