@@ -130,6 +130,9 @@ def test_a_changed_result_gives_a_warning(result, tmp_path):
     table.write_text(table.read_text().replace("0.02,", "0.021,", 1))
     with pytest.warns(UserWarning, match=r"result\.csv was changed since the run wrote it"):
         read(tmp_path)
+    (tmp_path / "run.json").unlink()
+    with pytest.warns(UserWarning, match=r"result\.csv was changed since the run wrote it"):
+        assert read_result(tmp_path).result.time[1] == 0.021
     with pytest.raises(ValueError, match=r"holds no result\.csv"):
         read(tmp_path / "nothing")
 
