@@ -472,7 +472,7 @@ def _record(folder: Path) -> dict[str, Any]:
 
 
 def inner_folder(folder: Path, *names: str) -> Path:
-    """Return a folder within another one, unless a link leads to it, perhaps elsewhere."""
+    """Return a folder within another one; an InputError refuses links, which may lead anywhere."""
     for name in names:
         folder /= name
         if folder.is_symlink():

@@ -506,7 +506,7 @@ def checkpoints_of(
 
 
 def check_gives_states(system: System) -> None:
-    """Check that all FMUs provide their state."""
+    """Check that all FMUs provide their state; an InputError names one that does not."""
     for name, component in system.components.items():
         if not component.gives_state:
             raise InputError(

@@ -242,7 +242,7 @@ def scenario_of(content: Mapping[str, Any]) -> Scenario:
 
 
 def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
-    """Check tables of events without a system."""
+    """Check tables of events without a system; Refused names all mistakes."""
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
 
     ScenarioFile.check(where, {"events": list(tables)})

@@ -107,7 +107,7 @@ def _file_of(name: str, fmu: str, folder: Path) -> Path:
 
 
 def check_built(fmu: Path) -> None:
-    """Check that an FMU exists if there is a script for it."""
+    """Raise an InputError if an FMU is missing and there is a script to build it from."""
     there = [*fmu.parent.iterdir()] if is_folder(fmu.parent) else []
     for script in () if fmu in there else sorted(there):
         if script.suffix == ".py" and name_of(script.stem).lower() == fmu.stem.lower():
