@@ -149,7 +149,7 @@ def _names(name: str, what: str) -> tuple[str, str]:
     class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
     for word in (module, class_name):
         if keyword.iskeyword(word):
-            raise InputError(f"{name!r}: {word} is a word of Python; choose another name")
+            raise InputError(f"{name!r}: {word} is a keyword of Python; choose another name")
     # Not sys.modules: a module of the user's may be imported there already.
     if module in sys.stdlib_module_names or PathFinder.find_spec(module):
         raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")

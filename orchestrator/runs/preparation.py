@@ -240,7 +240,7 @@ def brings_its_own(name: str) -> bool:
 def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
     """Raise an InputError if a kind of FMU is requested of a system with its own FMUs."""
     if kind == NATIVE or fmi != FMI_VERSIONS[0]:
-        raise InputError(f"{name}: brings its own FMUs; kind and fmi apply only to the bundle's")
+        raise InputError(f"{name}: contains its own FMUs; kind and fmi apply only to the bundle's")
 
 
 def left_behind(scenario: Scenario) -> str | None:

@@ -94,7 +94,7 @@ class EventTable(TomlTable):
         actions = [action for action in known if getattr(self, action) is not None]
         if len(actions) != 1:
             hint = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(known)}"
-            raise ValueError(f"write one thing that it does, {hint}")
+            raise ValueError(f"write one action, {hint}")
         if self.duration is not None and actions[0] in AT_ONCE:
             raise ValueError(f"{actions[0]} has no duration: leave `for` out")
         if self.repeat is not None and self.when is None:

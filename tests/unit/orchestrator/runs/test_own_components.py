@@ -96,7 +96,7 @@ def test_it_has_no_problems_and_its_scenario_runs(made: Path, capsys):
     ("name", "why"),
     [
         ("my-law", "'my-law': not a name for a component; use letters, digits and underscores"),
-        ("class", "'class': class is a word of Python; choose another name"),
+        ("class", "'class': class is a keyword of Python; choose another name"),
         ("json", "'json': json is already a module of Python; choose another name"),
     ],
 )
