@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from auv_fmu import __version__
 from orchestrator.commands import streams
-from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, OK, Unheard, say
+from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, OK, OutputLost, say
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError, StartError, did_you_mean, reason
 from orchestrator.machine.interrupts import orderly_end
@@ -69,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         say(str(error))
         status = FAILED if isinstance(error, StartError) else BAD_INPUT
-    except Unheard:
+    except OutputLost:
         status = FAILED
     except SystemExit as end:
         # The parser has shown its help, or a mistake.

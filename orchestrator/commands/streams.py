@@ -17,7 +17,7 @@ OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _LONGEST = 4000
 
 
-class Unheard(Exception):
+class OutputLost(Exception):
     """Standard output cannot be written; the user has been told."""
 
 
@@ -48,18 +48,18 @@ def show(*lines: object) -> None:
     """Write lines of output.
 
     Raises:
-        Unheard: they cannot be written.
+        OutputLost: they cannot be written.
 
     """
     try:
         for line in lines:
-            print(_in_its_letters(sys.stdout, escape_unprintable(str(line))))
+            print(_encodable(sys.stdout, escape_unprintable(str(line))))
     except OSError as error:
         _give_up(sys.stdout, error)
-        raise Unheard from error
+        raise OutputLost from error
 
 
-def _in_its_letters(stream: TextIO, text: str) -> str:
+def _encodable(stream: TextIO, text: str) -> str:
     """Escape letters that a stream cannot write, such as many in Windows' code pages."""
     encoding = stream.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)

@@ -408,7 +408,7 @@ def replace_files(
                 yield staging
                 publish(ledger)
             except (OSError, MemoryError, Taken) as error:
-                rest = _rest(ledger) if keep() and not ledger.moving else ""
+                rest = _keep_files(ledger) if keep() and not ledger.moving else ""
                 raise InputError(_cannot_write(folder, error, rest)) from error
 
 
@@ -419,14 +419,14 @@ def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
     return f"cannot write into {folder}: {reason(error)}{rest}{hint}"
 
 
-def _rest(ledger: Ledger) -> str:
+def _keep_files(ledger: Ledger) -> str:
     """Keep files that cannot be published, and tell where they are."""
     if not ledger.staging.is_dir():
         return ""
     try:
         # It may state that the run was completed.
         (ledger.staging / RECORD).unlink(missing_ok=True)
-        kept = ledger.staging.rename(_beside(ledger.folder))
+        kept = ledger.staging.rename(_free_place(ledger.folder))
     except OSError as error:
         return f"; nor can the files be kept: {reason(error)}"
     return f"; what was written is in {kept}"
@@ -453,10 +453,10 @@ def place_of(ledger: Ledger) -> Path:
     """Return the folder for the staged result: a failed one does not replace a complete one."""
     staged, earlier = _record(ledger.staging), _record(ledger.folder)
     has_complete = (ledger.folder / RECORD).is_file() and not earlier.get("failure")
-    return _beside(ledger.folder) if has_complete and staged.get("failure") else ledger.folder
+    return _free_place(ledger.folder) if has_complete and staged.get("failure") else ledger.folder
 
 
-def _beside(folder: Path) -> Path:
+def _free_place(folder: Path) -> Path:
     """Return the place for a result that must not replace another one."""
     names = chain([INCOMPLETE], (f"{INCOMPLETE}-{n}" for n in count(2)))
     return next(folder / name for name in names if not os.path.lexists(folder / name))

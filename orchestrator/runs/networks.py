@@ -336,11 +336,11 @@ class _Layers:
         self._layers: list[Dense] = []
         self._shapes = shapes
         self._constants = constants
-        self._known = {inputs: self._begun(shape)}
+        self._known = {inputs: self._results(shape)}
 
     def up_to(self, name: str) -> list[Dense]:
         """Return all layers up to a value."""
-        rest = self._ended(self._variable(name), "none")
+        rest = self._dense(self._variable(name), "none")
         if not rest.is_activation:
             return [*self._layers, rest]
         if not self._layers:
@@ -404,7 +404,7 @@ class _Layers:
             if each
         }
         numbers = {**defaults, **attributes, **given}
-        return self._closed(inputs[0], word, tuple(numbers.values()))
+        return self._end_layer(inputs[0], word, tuple(numbers.values()))
 
     def _number(self, name: str) -> float:
         """Return the number in a constant whose elements are all equal."""
@@ -427,7 +427,7 @@ class _Layers:
         for i in factors if operator.is_sum else ():
             if self._known[inputs[i]].is_sum:
                 # The product of the weights of two layers may be many more numbers.
-                self._known[inputs[i]] = self._closed(inputs[i], "none")
+                self._known[inputs[i]] = self._end_layer(inputs[i], "none")
         values = [self._known[each] if each else None for each in inputs]
         offset = _numbers(function(*(value and value.offset for value in values)))
         if not places:
@@ -463,17 +463,17 @@ class _Layers:
             raise InputError(f"{name} comes from an earlier layer: the network has branches")
         return value
 
-    def _ended(self, value: _Value, activation: str, numbers: Sequence[float] = ()) -> Dense:
+    def _dense(self, value: _Value, activation: str, numbers: Sequence[float] = ()) -> Dense:
         W = value.slopes.reshape(len(value.slopes), -1).T
         return Dense(W, value.offset.ravel(), activation, numbers)
 
-    def _closed(self, name: str, activation: str, numbers: Sequence[float] = ()) -> _Value:
+    def _end_layer(self, name: str, activation: str, numbers: Sequence[float] = ()) -> _Value:
         """End a layer; its results have the shape of its sums."""
         value = self._variable(name)
-        self._layers.append(self._ended(value, activation, numbers))
-        return self._begun(value.offset.shape)
+        self._layers.append(self._dense(value, activation, numbers))
+        return self._results(value.offset.shape)
 
-    def _begun(self, shape: tuple[int, ...]) -> _Value:
+    def _results(self, shape: tuple[int, ...]) -> _Value:
         """Return the results of the last layer, or the inputs."""
         n = math.prod(shape)
         if n > MOST_NEURONS:

@@ -183,7 +183,7 @@ def build_own(
         own = script if script.is_dir() else script.parent
         place = own if folder is None else folder
         try:
-            run_fmus("build", temporary, *options, *_home(own, place), hear=hear)
+            run_fmus("build", temporary, *options, *_from_option(own, place), hear=hear)
         except BuildFailed as error:
             removed = [path.name for path in _built_from(script, place)]
             for name in removed:
@@ -196,7 +196,7 @@ def build_own(
     return place / built.name
 
 
-def _home(script: Path, fmu: Path) -> Sequence[str]:
+def _from_option(script: Path, fmu: Path) -> Sequence[str]:
     """Return the option that records the path from an FMU to the folder of its script.
 
     It is omitted if a folder is outside of the project, which is the current folder.

@@ -500,7 +500,7 @@ def _event(table: Mapping[str, Any], system: System, followed: Collection[PortNa
     start = system.start_time or 0.0
     if table.get("at", start) < start:
         raise InputError(f"at = {table['at']}: before the run begins, at {start:g} s")
-    text = "stop" if key == "stop" else f"{key} {', '.join(_things(table[key]))}"
+    text = "stop" if key == "stop" else f"{key} {', '.join(_targets(table[key]))}"
     action = ACTIONS[key](table[key], system)
     for port, _ in action.inputs if isinstance(action, Set) else ():
         if port in followed:
@@ -516,7 +516,7 @@ def _event(table: Mapping[str, Any], system: System, followed: Collection[PortNa
     )
 
 
-def _things(value: Any) -> Iterator[str]:
+def _targets(value: Any) -> Iterator[str]:
     """Yield the targets of an event, with their values."""
     if isinstance(value, Mapping):
         yield from (f"{name} = {_shown(each)}" for name, each in flatten(value))
@@ -587,7 +587,7 @@ def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
     """Return the inputs that signals reach."""
     return tuple(
         target
-        for name in _things(names)
+        for name in _targets(names)
         for port in _ports(system, name, ("input", "output"))
         for target, _ in _routes(system, port)
     )
@@ -669,10 +669,10 @@ def _set(values: Mapping[str, Any], system: System) -> Action:
 
 
 def _reset(names: Any, system: System) -> Action:
-    for name in _things(names):
+    for name in _targets(names):
         if system.steps.get(system.component(name).name, system.step) != system.step:
             raise InputError(f"{name} takes longer steps: it cannot be reset within one")
-    return Reset(tuple(_things(names)))
+    return Reset(tuple(_targets(names)))
 
 
 #: Actions of events, by the key of their table.
@@ -683,7 +683,7 @@ ACTIONS: Mapping[str, Callable[[Any, System], Action]] = {
     "freeze": lambda names, system: Freeze(_inputs(names, system)),
     "drop": lambda names, system: Freeze(_inputs(names, system)),
     "lose": lambda names, system: Alter(
-        "override", _altered(dict.fromkeys(_things(names), 0), system, _value)
+        "override", _altered(dict.fromkeys(_targets(names), 0), system, _value)
     ),
     "release": lambda names, system: Release(_inputs(names, system)),
     "reset": _reset,
