@@ -26,8 +26,7 @@ from time import process_time
 from measuring import options, python, resident, timed
 
 from fmus.kinds import NATIVE
-from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import prepare
+from orchestrator.runs.preparation import load_scenario, prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.engine import Engine, FmuEngine, Point

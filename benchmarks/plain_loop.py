@@ -26,7 +26,7 @@ from time import process_time
 from measuring import options, python, timed
 
 from auv_fmu.paper.euler import STEP
-from orchestrator.runs.loading import load
+from orchestrator.runs.preparation import load
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 

@@ -37,8 +37,7 @@ from orchestrator.cosim import (
     write_osp,
     write_ssp,
 )
-from orchestrator.runs.loading import load
-from orchestrator.runs.preparation import prepare
+from orchestrator.runs.preparation import load, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 

@@ -24,8 +24,7 @@ from unittest.mock import patch
 
 from measuring import python
 
-from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.preparation import Prepared, load_scenario, prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.batch_engine import BatchEngine

@@ -5,7 +5,7 @@
     result.plot("plant.eta.*")
 
 ==================  ==========================================================
-room                what it is for
+room                contents
 ==================  ==========================================================
 :mod:`.machine`     the operating system: errors, files, processes, compilers
 :mod:`.cosim`       a co-simulation master for any system of FMUs
@@ -16,12 +16,12 @@ room                what it is for
 :mod:`.live`        the page in which a system runs
 :mod:`.exchange`    other tools: hosts, verification of their tables
 :mod:`.studies`     many runs
-:mod:`.paper`       the paper's numbers and claims beside ours
+:mod:`.paper`       the paper's numbers and claims compared with ours
 :mod:`.commands`    the command line
 ==================  ==========================================================
 
-Each imports only what stands above it in this table. Components are known as FMUs behind their
-ports; what stands above `vehicle` knows none of them by name.
+Each imports only rooms above it in this table. Components are used as FMUs through their ports;
+rooms above `vehicle` contain no name of a component.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from typing import TYPE_CHECKING
 from orchestrator.machine.lazy import offered
 
 if TYPE_CHECKING:
-    from orchestrator.runs.loading import load
+    from orchestrator.runs.preparation import load
     from orchestrator.runs.result import Result, read
     from orchestrator.runs.run import simulate
     from orchestrator.studies.study_result import StudyResult
@@ -42,7 +42,7 @@ __all__ = ["Result", "StudyResult", "load", "read", "simulate", "sweep"]
 __getattr__, __dir__ = offered(
     __name__,
     {
-        "runs.loading": "load",
+        "runs.preparation": "load",
         "runs.result": "Result read",
         "runs.run": "simulate",
         "studies.study_result": "StudyResult",

@@ -49,9 +49,8 @@ from orchestrator.cosim import PortName, System, Table
 from orchestrator.paper.claims import total_variation_until
 from orchestrator.paper.page import numbers, table
 from orchestrator.program.components import definitions_of
-from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.networks import component_text, read_network
-from orchestrator.runs.preparation import prepare_request, with_companion
+from orchestrator.runs.preparation import load_scenario, prepare_request, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.studies.batch_engine import BatchEngine

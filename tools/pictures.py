@@ -16,7 +16,7 @@ from PIL import Image
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.style import SETTINGS
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import names
 from orchestrator.studies.space import Space
 from orchestrator.studies.study_file import read_figures, read_study

@@ -31,7 +31,7 @@ from orchestrator.paper.claims import (
     errors,
 )
 from orchestrator.paper.page import numbers, table
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
 from orchestrator.vehicle.index.final_error import LAST

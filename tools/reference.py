@@ -41,8 +41,8 @@ from orchestrator.cosim import (
 from orchestrator.cosim.formats.ssp_writer import parameter_set_xml
 from orchestrator.cosim.observers import CsvFile
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.own_components import build_own
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.wiring import closed_loop
 
 #: The components that are examples.

@@ -36,7 +36,7 @@ from orchestrator.vehicle.proof import gain_check
 
 
 def add_build(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu build`."""
+    """Add the options of `auv-fmu build`."""
     describe(
         parser,
         "Build the bundle (every FMU, and auv.ssp), or the FMU of your own component. Files that "
@@ -80,7 +80,7 @@ def add_build(parser: argparse.ArgumentParser) -> None:
 
 
 def add_new(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu new`."""
+    """Add the options of `auv-fmu new`."""
     describe(parser, "Create the files of your own component.", "new component my_filter")
     kinds = parser.add_subparsers(required=True, metavar="KIND", help="kind of component")
     component = kinds.add_parser(
@@ -129,7 +129,7 @@ def add_new(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_place(parser: argparse.ArgumentParser, what: str, examples: str) -> None:
-    """Declare name and folder of a new component."""
+    """Add the name and folder of a new component."""
     parser.add_argument("name", metavar="NAME", help=f"name of the {what}, for example {examples}")
     parser.add_argument(
         "folder",
@@ -141,7 +141,7 @@ def _add_place(parser: argparse.ArgumentParser, what: str, examples: str) -> Non
 
 
 def add_gains(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu gains`."""
+    """Add the options of `auv-fmu gains`."""
     describe(
         parser,
         "Check whether the gains meet the conditions of Theorems 1 and 2.",

@@ -16,13 +16,12 @@ from orchestrator.cosim import Component, check_binary, read_component
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
-from orchestrator.runs.loading import load_scenario, outdated
-from orchestrator.runs.preparation import FALLBACK_STOP_TIME, prepare
+from orchestrator.runs.preparation import FALLBACK_STOP_TIME, load_scenario, outdated, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
 from orchestrator.studies.study import is_study
 
-#: Surprises for the user of an FMU, by a flag of its description and the value that means it.
+#: Surprises for the user of an FMU, by a flag of its description and its surprising value.
 _SURPRISES = {
     ("canBeInstantiatedOnlyOncePerProcess", True): "allows one instance per process: each "
     "further one runs in a separate process",
@@ -35,7 +34,7 @@ _SURPRISES = {
 
 
 def add_check(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu check`."""
+    """Add the options of `auv-fmu check`."""
     describe(
         parser,
         "Validate an FMU, an SSP, a scenario, a study or your own component (NAME.py or its "
@@ -76,6 +75,7 @@ def _is_own(path: Path) -> bool:
     """Tell whether a path is a script, or a folder with a component, to be imported.
 
     A folder with a system or an FMU is not, whatever else is in it.
+
     """
     others = ("OspSystemStructure.xml", "modelDescription.xml")
     if any((path / name).is_file() for name in others) or any(path.glob("*.ssd")):
@@ -159,16 +159,12 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
 def examine(fmu: Path, findings: Findings) -> Component | None:
     """Note all mistakes in an FMU.
 
-    Args:
-        fmu: the file.
-        findings: take the notes.
-
     Returns:
         The FMU; None: it cannot be run.
 
     """
     with findings.collecting():
-        # Readers differ in what they make of a description with references to nothing.
+        # A validator may fail on references to nothing, so they are looked for first.
         for text in list(_dangling(fmu)) or _flaws(fmu):
             findings.note(text)
         component = read_component(fmu.stem, fmu)
@@ -188,7 +184,7 @@ def examine(fmu: Path, findings: Findings) -> Component | None:
 
 
 def surprises(component: Component) -> Iterator[str]:
-    """Name abilities that an FMU lacks, and its differences from most FMUs."""
+    """Yield abilities that an FMU lacks, and its differences from most FMUs."""
     if component.unsupported:
         yield component.remainder
     if any(variable.type == "Clock" for variable in component.description.modelVariables):
@@ -210,7 +206,7 @@ def surprises(component: Component) -> Iterator[str]:
 def _flaws(fmu: Path) -> list[str]:
     """Find violations of the standard's schema and rules in the description."""
     if not (unpack(fmu).folder / "modelDescription.xml").is_file():
-        # The reader of the FMU says so.
+        # The reader of the FMU reports that.
         return []
     try:
         return [str(problem) for problem in validate_fmu(str(fmu))]
@@ -219,7 +215,7 @@ def _flaws(fmu: Path) -> list[str]:
 
 
 def _dangling(fmu: Path) -> Iterator[str]:
-    """References in the structure of the model to variables that do not exist."""
+    """Find references in the structure of the model to variables that do not exist."""
     try:
         root = ElementTree.parse(unpack(fmu).folder / "modelDescription.xml").getroot()
     except (OSError, ElementTree.ParseError):

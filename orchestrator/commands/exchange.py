@@ -32,26 +32,33 @@ from orchestrator.program.components import definitions_of
 from orchestrator.program.files import ProgramFiles, write_files
 from orchestrator.program.fmu import SystemModel, write_fmu
 from orchestrator.runs.folder import replace_files
-from orchestrator.runs.loading import brings_its_own, first_given, left_behind, load
-from orchestrator.runs.preparation import DEFAULT_STEP, FALLBACK_STOP_TIME, prepare
+from orchestrator.runs.preparation import (
+    DEFAULT_STEP,
+    FALLBACK_STOP_TIME,
+    brings_its_own,
+    first_given,
+    left_behind,
+    load,
+    prepare,
+)
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import read_events, read_scenario
 
 #: Formats of an export.
 EXPORT_FORMATS = SSP, OSP, FMU, C = "ssp", "osp", "fmu", "c"
 
-#: Options of `export` that are for one format only.
+#: Options of `export` that apply to one format only.
 _OF_FORMAT = {"flat": SSP, "connectors": SSP, "platforms": FMU, "single": C}
 
-#: Tools that do not set parameters of a type.
+#: Tools that do not set parameters of a type, by the type.
 _LEAVING = {"Enumeration": "libcosim and ecos", "String": "OMSimulator and others"}
 
-#: Options of `verify` that are for a table only.
+#: Options of `verify` that apply to tables only.
 _OF_TABLES = ("scenario", "step", "order", "initial", "events", "set")
 
 
 def add_export(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu export`."""
+    """Add the options of `auv-fmu export`."""
     describe(
         parser,
         "Write a scenario for other tools: its FMUs, connections and parameters, or all of it as "
@@ -94,7 +101,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
 
 
 def add_release(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu release`."""
+    """Add the options of `auv-fmu release`."""
     describe(
         parser,
         "Write the archives of a release: every FMU, for all platforms.",
@@ -106,7 +113,7 @@ def add_release(parser: argparse.ArgumentParser) -> None:
 
 
 def add_hosts(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu hosts`."""
+    """Add the options of `auv-fmu hosts`."""
     describe(
         parser,
         "Run a scenario in other co-simulation tools and compare their results with auv-fmu's.",
@@ -131,7 +138,7 @@ def add_hosts(parser: argparse.ArgumentParser) -> None:
 
 
 def add_verify(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu verify`."""
+    """Add the options of `auv-fmu verify`."""
     describe(
         parser,
         "Compare a table from another tool with a run of the same scenario, or run the reference "
@@ -229,27 +236,25 @@ def _export(options: argparse.Namespace) -> int:
                 "leave as they are in the FMU"
             )
     folder = options.out or Path("exports", prepared.scenario.stem)
-    with replace_files(folder, force=options.force) as unfinished:
+    with replace_files(folder, force=options.force) as staging:
         if options.format == FMU:
             definitions = definitions_of(system)
             model = SystemModel(
                 prepared.plan, definitions, system.name, prepared.scenario.title or system.name
             )
-            written = write_fmu(model, unfinished, options.fmi, options.platforms, say)
+            written = write_fmu(model, staging, options.fmi, options.platforms, say)
         elif options.format == C:
             title = prepared.scenario.title or system.name
             program = ProgramFiles(
                 prepared.plan, definitions_of(system), prepared.scenario.stem, title, options.single
             )
-            written = write_files(program, unfinished)
+            written = write_files(program, staging)
         elif options.format == OSP:
-            written = write_osp(system, unfinished)
+            written = write_osp(system, staging)
         else:
-            written = write_ssp(
-                system, unfinished, flat=options.flat, connectors=options.connectors
-            )
+            written = write_ssp(system, staging, flat=options.flat, connectors=options.connectors)
     for path in written:
-        show(folder / path.relative_to(unfinished))
+        show(folder / path.relative_to(staging))
     return OK
 
 
@@ -310,7 +315,7 @@ def _verify(default: Callable[[str], object], options: argparse.Namespace) -> in
 
 
 def _verify_carried(options: argparse.Namespace) -> int:
-    """Verify an FMU by the results that it carries; all of them must agree."""
+    """Compare an FMU with the results that it carries; all of them must agree."""
     carried = Carried(options.table, options.verbose)
     show(f"{options.table.name}: FMI-LS-REF {carried.version}")
     for note in carried.notes:

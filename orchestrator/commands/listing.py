@@ -1,4 +1,4 @@
-"""`auv-fmu list`, which imports nothing that takes longer than the command itself."""
+"""`auv-fmu list`, with few imports, so that it takes no time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from orchestrator.runs import SCENARIOS_FOLDER, names_in
 
 
 def add_list(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu list`."""
+    """Add the options of `auv-fmu list`."""
     describe(parser, "List the scenarios with their titles.", "list")
     parser.set_defaults(action=_list)
 

@@ -30,16 +30,15 @@ from orchestrator.runs.progress import Progress
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.result import (
     METRICS,
-    changed_files,
     companion_tables,
     read_metrics,
     read_record,
     read_result,
     table_in,
 )
-from orchestrator.vehicle.signals import Loop, loops_of
+from orchestrator.vehicle.signals import Loop
 
-#: The scenario that a live page opens unless another is named.
+#: Default scenario of a live page.
 _OPENED = "fig4"
 
 #: Formats of a plot.
@@ -47,7 +46,7 @@ _PLOTS = (".png", ".svg", ".pdf")
 
 
 def add_plot(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu plot`."""
+    """Add the options of `auv-fmu plot`."""
     describe(
         parser,
         "Plot signals of stored results over time. Several results share the axes.",
@@ -65,7 +64,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
 
 
 def add_view(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu view`."""
+    """Add the options of `auv-fmu view`."""
     describe(
         parser,
         "Write one self-contained page that plays a stored result: the paths of its vehicles in "
@@ -78,7 +77,7 @@ def add_view(parser: argparse.ArgumentParser) -> None:
 
 
 def add_live(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu live`."""
+    """Add the options of `auv-fmu live`."""
     describe(
         parser,
         "Write one self-contained page in which the closed loop runs in the browser: change gains, "
@@ -98,7 +97,7 @@ def add_live(parser: argparse.ArgumentParser) -> None:
 
 
 def add_animate(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu animate`."""
+    """Add the options of `auv-fmu animate`."""
     describe(
         parser,
         "Run a scenario and write a film of the vehicle with its errors and commands; for several "
@@ -126,7 +125,7 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
 
 
 def _size(text: str) -> tuple[int, int]:
-    """Width and height, with an x between them."""
+    """Read a width and a height with an x between them."""
     width, _, height = text.partition("x")
     if not (width.isdecimal() and height.isdecimal()):
         raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT")
@@ -145,8 +144,6 @@ def _plot(options: argparse.Namespace) -> int:
     patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
-    for path in paths:
-        _warn(table_in(path))
     wanted = partial(wanted_columns, patterns=patterns)
     runs = _named([read_result(path, wanted) for path in paths], paths)
     figure = plot(told_apart(runs, paths), patterns)
@@ -155,14 +152,8 @@ def _plot(options: argparse.Namespace) -> int:
     return OK
 
 
-def _warn(table: Path) -> None:
-    """Warn of files that were changed since the run wrote them."""
-    for file in changed_files(table):
-        say(f"warning: {file} was changed since the run wrote it")
-
-
 def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
-    """Runs by their labels, or by their scenarios if labels are missing or the same."""
+    """Label runs by their labels, or by their scenarios if labels are missing or the same."""
     records = [read_record(table_in(path)) for path in paths]
     labels = {record.get("label") for record in records} - {"", None}
     if len(labels) == len(runs):
@@ -174,7 +165,7 @@ def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
 
 
 def _is_there(text: str) -> bool:
-    """Tell whether there is such a file or folder; a text that is no path names none."""
+    """Tell whether there is such a file or folder."""
     with suppress(OSError):
         return Path(text).exists()
     return False
@@ -189,15 +180,13 @@ def _view(options: argparse.Namespace) -> int:
     if out.suffix != ".html":
         raise InputError(f"{out}: must end with .html")
     files = [file, *companion_tables(file)[:1]]
-    for one in files:
-        _warn(one)
-    runs = told_apart([read_result(one, _viewed) for one in files], files)
+    runs = told_apart([read_result(table, _viewed) for table in files], files)
     record = read_record(file)
     title = str(record.get("title") or runs[0].label)
     # A title may name all runs that a scenario compares.
     if (label := record.get("label")) and len(files) == 1:
         title += f" (shown: {label})"
-    indices = [one.with_name(METRICS) for one in files]
+    indices = [table.with_name(METRICS) for table in files]
     stored = [
         Stored(run, read_metrics(path) if path.is_file() else {})
         for run, path in zip(runs, indices, strict=True)
@@ -212,7 +201,7 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _viewed(columns: Sequence[str], loops: Sequence[Loop]) -> Collection[str]:
-    """The columns whose extremes are kept: of vehicles what is drawn, or all."""
+    """Choose the columns whose extremes are kept: the drawn ones of vehicles, or all."""
     drawn = {name for loop in loops for name in loop.drawn()}
     return drawn if drawn.intersection(columns) else columns
 
@@ -236,7 +225,7 @@ def _animate(options: argparse.Namespace) -> int:
     film = Film(options.fps, options.size, options.speed)
     film.check(out)
     prepared = prepare(scenario, system, request(options))
-    loops = loops_of(prepared.system)
+    loops = prepared.loops
     seen = VisibleRows({name for loop in loops for name in loop.drawn()})
     observers: list[Observer] = [seen, Progress(scenario.name)]
     run = Drawn(scenario.name, seen, scenario.z_up, loops)
@@ -251,7 +240,7 @@ def _animate(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _written(file: Path, force: bool) -> Iterator[Path]:
-    """Give a folder to write a file into, move the file to its own folder, and show its path."""
-    with replace_files(file.parent, [file.name], force=force) as unfinished:
-        yield unfinished
+    """Provide a folder to write a file into, move the file to its own folder, and show its path."""
+    with replace_files(file.parent, [file.name], force=force) as staging:
+        yield staging
     show(file)

@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 from auv_fmu import __version__
 from orchestrator.commands import streams
-from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, OK, Unheard, say
+from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, OK, OutputLost, say
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError, StartError, did_you_mean, reason
 from orchestrator.machine.interrupts import orderly_end
@@ -43,16 +43,16 @@ COMMANDS = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Entry point; returns the exit status.
+    """Run a command and return its exit status.
 
     Args:
-        arguments: of a command within a process that goes on; None: the process's own, which
-            ends after it.
+        arguments: of a command in a process that continues; None: the arguments of the process,
+            which ends after it.
 
     """
-    # No matrix here is worth a thread, and numpy's library ends in Ctrl-C where it gets none.
+    # Matrices here are small, and numpy's library ends the process if it cannot start a thread.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    # Without a folder for its fonts, it complains at length and draws all the same.
+    # Without a folder for its fonts, it draws, too, but with long warnings.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     streams.fill_streams()
     status = OK
@@ -69,10 +69,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except InputError as error:
         say(str(error))
         status = FAILED if isinstance(error, StartError) else BAD_INPUT
-    except Unheard:
+    except OutputLost:
         status = FAILED
     except SystemExit as end:
-        # The parser has shown its help, or complained.
+        # The parser has shown its help, or a mistake.
         if not streams.finished():
             raise SystemExit(end.code or FAILED) from None
         raise
@@ -87,7 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *place: Any) -> None:
-    """Say a warning for the user, without the line of code that it comes from."""
+    """Show a warning for the user, without the line of code that it comes from."""
     if category is UserWarning:
         say(f"warning: {message}")
     else:
@@ -95,7 +95,7 @@ def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *plac
 
 
 def _check_no_empty(arguments: Sequence[str]) -> None:
-    """Check that no argument is empty, as that of an unset variable of the shell.
+    """Check that no argument is empty, like an unset variable of the shell.
 
     Raises:
         InputError: one is empty.
@@ -109,7 +109,7 @@ def _check_no_empty(arguments: Sequence[str]) -> None:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that answers a mistake with two lines: a short usage, and the mistake."""
+    """A parser that reports a mistake in two lines: a short usage, and the mistake."""
 
     def parse_known_args(self, *arguments: Any, **more: Any) -> tuple[Any, list[str]]:
         """Parse arguments; the parser of a command refuses unknown ones, with its own usage."""
@@ -140,11 +140,11 @@ class Parser(argparse.ArgumentParser):
 
 
 def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
-    """The parser of the command line.
+    """Make the parser of the command line.
 
     Args:
-        given: arguments; commands that they do not name have only their help, because importing
-            the modules of a command takes up to a second.
+        given: arguments; other commands have only their help, because importing the modules of a
+            command takes up to a second.
 
     """
     parser = Parser(

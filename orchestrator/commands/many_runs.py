@@ -18,7 +18,7 @@ from orchestrator.vehicle.cautions import CAUTIONS
 
 
 def add_sweep(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu sweep`."""
+    """Add the options of `auv-fmu sweep`."""
     describe(
         parser,
         "Run a study and draw its figures. Runs that are already in its folder are not made again.",
@@ -34,7 +34,7 @@ def add_sweep(parser: argparse.ArgumentParser) -> None:
 
 
 def add_report(parser: argparse.ArgumentParser) -> None:
-    """Declare the options of `auv-fmu report`."""
+    """Add the options of `auv-fmu report`."""
     describe(
         parser,
         "Run all scenarios, compare them with the paper, and write report.html and report.md.",

@@ -1,4 +1,4 @@
-"""Options that several commands share, and the report of the end of a run."""
+"""Options that several commands share, and messages about the end of a run."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.commands.streams import FAILED, OK, say
 from orchestrator.cosim import Ending, System
 from orchestrator.machine.errors import Findings, InputError
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.request import Request, flags
 from orchestrator.runs.scenario import Scenario
 
@@ -19,7 +19,7 @@ T = TypeVar("T")
 
 
 def add_system(parser: argparse.ArgumentParser) -> None:
-    """Declare the system to run."""
+    """Add the system to run."""
     parser.add_argument(
         "scenario",
         metavar="SCENARIO|FILE|DIR",
@@ -30,7 +30,7 @@ def add_system(parser: argparse.ArgumentParser) -> None:
 
 
 def add_variant(parser: argparse.ArgumentParser) -> None:
-    """Declare the choice of a system in an archive."""
+    """Add the choice of a system in an archive."""
     parser.add_argument(
         "--variant",
         metavar="NAME",
@@ -57,7 +57,7 @@ def request(options: argparse.Namespace) -> Request:
 
 
 def add_fmi(parser: argparse.ArgumentParser, *others: str) -> None:
-    """Declare the version of FMI; `others` are further options that can have the last one."""
+    """Add the version of FMI; `others` are further options that allow the last one."""
     needs = " or ".join((f"--kind {NATIVE}", *others))
     parser.add_argument(
         "--fmi",
@@ -68,7 +68,7 @@ def add_fmi(parser: argparse.ArgumentParser, *others: str) -> None:
 
 
 def add_platforms(parser: argparse.ArgumentParser, what: str) -> None:
-    """Declare the platforms of libraries; `what` names the option that makes libraries."""
+    """Add the platforms of libraries; `what` is the option that makes libraries."""
     parser.add_argument(
         "--platforms",
         metavar="NAME,...|all",
@@ -78,7 +78,7 @@ def add_platforms(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def add_kind(parser: argparse.ArgumentParser) -> None:
-    """Declare the kind of FMUs for other tools; the default does not depend on a compiler here."""
+    """Add the kind of FMUs for other tools; the default does not depend on a compiler here."""
     parser.add_argument(
         "--kind",
         choices=KINDS,
@@ -89,7 +89,7 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:
-    """Declare values in place of the scenario's."""
+    """Add values that replace the scenario's."""
     parser.add_argument(
         "--set",
         action="append",
@@ -100,7 +100,7 @@ def add_set(parser: argparse.ArgumentParser) -> None:
 
 
 def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
-    """Declare the output folder; its default is a path, or a text for the help alone."""
+    """Add the output folder; its default is a path, or a text for the help only."""
     path = default if isinstance(default, Path) else None
     text = f"output folder; default: {default}"
     parser.add_argument("--out", type=Path, default=path, metavar="DIR", help=text)
@@ -120,7 +120,7 @@ def read_system(
 
 
 def status(name: str, ending: Ending) -> int:
-    """Say the events and the end of a run, and return its exit status."""
+    """Show the events and the end of a run, and return its exit status."""
     failure = ending.failure or ""
     for message in ending.messages:
         if not failure.endswith(f": {message}"):
@@ -136,7 +136,7 @@ def status(name: str, ending: Ending) -> int:
 
 
 def assignments(options: argparse.Namespace) -> dict[str, object]:
-    """The values of --set."""
+    """Return the values of --set."""
     values: dict[str, object] = {}
     for text in options.set:
         name, equals, value = map(str.strip, text.partition("="))

@@ -1,10 +1,10 @@
-"""`auv-fmu run`, apart from the studies, which take a fifth of a second to import."""
+"""`auv-fmu run`, in a module without studies, whose import takes a fifth of a second."""
 
 from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from itertools import groupby
 from operator import itemgetter
@@ -24,7 +24,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import describe, say, show
 from orchestrator.machine.errors import Findings
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
-from orchestrator.runs.preparation import Prepared, prepare, with_companion
+from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.result import summary
 from orchestrator.runs.run import run_into
@@ -63,8 +63,15 @@ def _run(options: argparse.Namespace) -> int:
     for note in findings.notes:
         say(f"warning: {note}")
     folder = options.out or Path("results", runs[0].scenario.stem)
-    draw = None if files.no_figures or not _has_vehicle(runs[0]) else _drawing()
-    # To the very end: after several interrupts, too, the user is told where the rows are.
+    draw = None
+    # All figures show a vehicle.
+    vehicles = {loop.vehicle for loop in runs[0].loops} & runs[0].system.components.keys()
+    if vehicles and not files.no_figures:
+        # The import takes long: now, there are no rows to lose.
+        from orchestrator.figures.drawing import draw as draw_figures  # noqa: PLC0415
+
+        draw = draw_figures
+    # To the end, so that several interrupts do not hide where the rows are.
     with held_interrupts(_answer, is_last=True):
         place, finished = run_into(folder, runs, files, options.command, say, draw)
         for run in finished:
@@ -77,26 +84,14 @@ def _run(options: argparse.Namespace) -> int:
     return max(status(run.name, run.ending) for run in finished)
 
 
-def _has_vehicle(prepared: Prepared) -> bool:
-    """Tell whether there is a vehicle, which all figures show."""
-    return any(loop.vehicle in prepared.system.components for loop in prepared.loops)
-
-
-def _drawing() -> Callable[..., list[str]]:
-    """Import the drawing function, which takes long, before there are rows to lose."""
-    from orchestrator.figures.drawing import draw  # noqa: PLC0415
-
-    return draw
-
-
 def _answer(interrupts: Interrupts) -> None:
-    """Answer an interrupt from within the handler of its signal."""
+    """Answer an interrupt within the handler of its signal."""
     text = "stopping: writing and drawing the computed rows; interrupt again to skip the figures"
     if interrupts.urgent:
         text = (
             "stopping at once, without figures; a third interrupt ends an FMU that does not return"
         )
-    # The signal may have interrupted print, which must not be entered a second time.
+    # The signal may have interrupted print, which is not reentrant.
     with suppress(OSError):
         os.write(2, f"auv-fmu: {text}\n".encode())
 

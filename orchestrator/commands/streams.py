@@ -1,4 +1,4 @@
-"""Output of the command line and its exit statuses; streams may be closed or full."""
+"""Output of the command line, and its exit statuses; streams may be closed or full."""
 
 from __future__ import annotations
 
@@ -13,18 +13,19 @@ from orchestrator.machine.errors import escape_unprintable, shortened
 #: Exit status: done, a simulation failed, bad usage or input, ended by the user.
 OK, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 
-#: Letters of a line for the user: a name or a value in it may be a whole file.
+#: Longest line for the user: a name or a value in it may be a whole file.
 _LONGEST = 4000
 
 
-class Unheard(Exception):
-    """Standard output cannot be written, and the user has been told."""
+class OutputLost(Exception):
+    """Standard output cannot be written; the user has been told."""
 
 
 def fill_streams() -> None:
     """Open the null device in place of closed standard streams.
 
-    Otherwise, the next file that is opened would take the place, and get the output.
+    Otherwise, the next file that is opened would get their number, and the output.
+
     """
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
@@ -47,25 +48,25 @@ def show(*lines: object) -> None:
     """Write lines of output.
 
     Raises:
-        Unheard: they cannot be written.
+        OutputLost: they cannot be written.
 
     """
     try:
         for line in lines:
-            print(_in_its_letters(sys.stdout, escape_unprintable(str(line))))
+            print(_encodable(sys.stdout, escape_unprintable(str(line))))
     except OSError as error:
         _give_up(sys.stdout, error)
-        raise Unheard from error
+        raise OutputLost from error
 
 
-def _in_its_letters(stream: TextIO, text: str) -> str:
-    """Escape letters that a stream cannot write: Windows' code pages have few."""
+def _encodable(stream: TextIO, text: str) -> str:
+    """Escape letters that a stream cannot write, such as many in Windows' code pages."""
     encoding = stream.encoding or "utf-8"
     return text.encode(encoding, "backslashreplace").decode(encoding)
 
 
 def finished() -> bool:
-    """Tell whether all output could be written, and say why if not."""
+    """Flush all output; returns False, after a message, if it cannot be written."""
     return all([_flushed(sys.stdout), _flushed(sys.stderr)])
 
 
@@ -79,9 +80,9 @@ def _flushed(stream: TextIO) -> bool:
 
 
 def _give_up(stream: TextIO, error: OSError) -> None:
-    # Python would try again when the process ends, and complain.
+    # Otherwise, Python tries again when the process ends, and prints a traceback.
     os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-    # If the reader has gone, nobody misses the rest.
+    # A reader that has ended needs no message.
     if not isinstance(error, BrokenPipeError):
         say(f"cannot write the output: {error.strerror}")
 

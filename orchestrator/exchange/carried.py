@@ -33,7 +33,7 @@ from orchestrator.machine.documents import read_document
 from orchestrator.machine.errors import Findings, InputError, listed
 from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors
-from orchestrator.runs.loading import first_given, read_fmu
+from orchestrator.runs.preparation import first_given, read_fmu
 from orchestrator.runs.scenario import with_input_table
 
 #: The name of the standard, in a manifest.

@@ -35,8 +35,7 @@ from orchestrator.live.programs import REDUCERS, Programs
 from orchestrator.machine.errors import InputError
 from orchestrator.program.reducing import looking_at
 from orchestrator.program.writer import Text
-from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import Prepared, prepare, with_companion
+from orchestrator.runs.preparation import Prepared, load_scenario, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import (
     Difference,

@@ -1,7 +1,8 @@
 """One run: scenarios, the wiring of the closed loop, the bundle, result folders.
 
-A scenario becomes a system in `wiring`, is checked in `preparation`, and run by `run`, in memory or
-into a folder. A `result` is what comes of it.
+A `scenario` becomes a system by `wiring`, a run by `preparation`, and rows by `run`, in memory or
+in a folder. A `result` contains the rows, the indices and the record.
+
 """
 
 from pathlib import Path
@@ -13,29 +14,27 @@ SCENARIOS_FOLDER = Path(__file__).parent / "scenarios"
 
 
 def names_in(folder: Path) -> list[str]:
-    """Return the names of the files that come with the program in a folder, without .toml."""
+    """Return the names of the files in a folder of the program, without .toml."""
     return sorted(path.stem for path in folder.glob("*.toml"))
 
 
 def find_toml(name: str, folder: Path, what: str, files: str) -> Path:
-    """Find a file that comes with the program by its name, or one of the user's by its path.
+    """Find a file of the program by its name, or one of the user's by its path.
 
     Args:
         name: of the file, or its path, which ends in .toml.
-        folder: of those that come with the program.
+        folder: of the files of the program.
         what: kind of file, for the message.
-        files: kinds of files that may be given in place of a name, for the message.
+        files: kinds of files that may be given instead of a name, for the message.
 
     Raises:
-        InputError: there is none of that name.
+        InputError: there is no file with that name.
 
     """
     if name.endswith(".toml"):
         return Path(name)
     known = names_in(folder)
     if name not in known:
-        raise InputError(
-            f"no {what} {name!r}; there are {', '.join(known)}, or give {files}"
-            f"{did_you_mean(name, known)}"
-        )
+        hint = did_you_mean(name, known) or f"; there are {', '.join(known)}, or give {files}"
+        raise InputError(f"no {what} {name!r}{hint}")
     return folder / f"{name}.toml"

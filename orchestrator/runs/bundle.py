@@ -1,8 +1,9 @@
-"""Building: the bundle of FMUs, and the FMUs of runs.
+"""Building the bundle, and the FMUs of runs.
 
-`auv-fmu build` writes the bundle where the user wants it. Runs use FMUs of their own in the user's
-cache folder, one folder for each version of the sources and each kind of FMU, so that nothing
-appears where they are called.
+`auv-fmu build` writes the bundle into the user's folder. Runs keep their FMUs in the user's cache
+folder, one folder for each version of the sources and each kind of FMU, so that no files appear in
+the current folder.
+
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from orchestrator.runs.wiring import closed_loop
 #: Default folders of `auv-fmu build`.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
 
-#: Files beside the FMUs: the archive of the closed loop, the settings of the build, and checksums.
+#: Further files of a bundle: archive of the closed loop, settings of the build, checksums.
 ARCHIVE, MANIFEST, CHECKSUMS = "auv.ssp", "build.json", "SHA256SUMS"
 
 #: The folder of the FMUs of runs, in the user's cache folder.
@@ -45,12 +46,12 @@ class Form(TypedDict, total=False):
     """Form of FMUs.
 
     Attributes:
-        kind: one of :data:`fmus.kinds.KINDS`; by default the Python kind.
+        kind: one of :data:`fmus.kinds.KINDS`; default: python.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
-        loader: of the Python kind, `native` or `plain`; None: what is there, and for new files
-            native where it can be compiled.
+        loader: of the Python kind, `native` or `plain`; None: as in existing files; for new files
+            native, if it can be compiled.
         platforms: of the native kind, with commas between them; None: this machine.
-        arrays: whether vectors and matrices of one unit are arrays of FMI 3.0.
+        arrays: True if vectors and matrices of one unit are arrays of FMI 3.0.
 
     """
 
@@ -62,9 +63,13 @@ class Form(TypedDict, total=False):
 
 
 def words_of(form: Form) -> list[str]:
-    """The options of the build for a form."""
-    texts = {name: value for name, value in form.items() if isinstance(value, str)}
-    words = [word for name, value in texts.items() for word in (f"--{name}", value)]
+    """Return the options of the build for a form."""
+    words = [
+        word
+        for name, value in form.items()
+        if isinstance(value, str)
+        for word in (f"--{name}", value)
+    ]
     return words + ["--arrays"] * form.get("arrays", False)
 
 
@@ -79,9 +84,9 @@ def build_bundle(
 
     Args:
         folder: made if it does not exist.
-        force: move aside files of the user's that have names of these.
+        force: move aside files of the user's that are in the way.
         hear: called with a line when a library is made.
-        form: of the FMUs; with arrays, the SSP is left out, whose connections are of scalars.
+        form: of the FMUs; with arrays, no SSP is written, because its connections are of scalars.
 
     Returns:
         The files that had to be written.
@@ -90,33 +95,33 @@ def build_bundle(
         InputError: the folder cannot be written, or the FMUs cannot be built.
 
     """
-    with replace_files(folder, (ARCHIVE, MANIFEST, CHECKSUMS), force=force) as unfinished:
+    with replace_files(folder, (ARCHIVE, MANIFEST, CHECKSUMS), force=force) as staging:
         # FMUs that are up to date are kept.
         for path in (*folder.glob("*.fmu"), folder / MANIFEST):
             if path.is_file():
-                shutil.copy2(path, unfinished)
-        run_fmus("build", unfinished, *words_of(form), hear=hear)
-        files = sorted(unfinished.glob("*.fmu"))
+                shutil.copy2(path, staging)
+        run_fmus("build", staging, *words_of(form), hear=hear)
+        files = sorted(staging.glob("*.fmu"))
         if not form.get("arrays"):
-            files += write_ssp(closed_loop(unfinished), unfinished)
-        write_checksums(unfinished, files)
-        for path in unfinished.iterdir():
+            files += write_ssp(closed_loop(staging), staging)
+        write_checksums(staging, files)
+        for path in staging.iterdir():
             before = folder / path.name
             if before.is_file() and before.read_bytes() == path.read_bytes():
                 path.unlink()
-        written = sorted(path.name for path in unfinished.iterdir())
+        written = sorted(path.name for path in staging.iterdir())
     return [folder / name for name in written]
 
 
 def write_checksums(folder: Path, files: Sequence[Path]) -> Path:
-    """Write the checksums of files in a folder, as `sha256sum --check` reads them."""
+    """Write the checksums of files in a folder for `sha256sum --check`."""
     lines = (f"{sha256_of(path)}  {path.relative_to(folder).as_posix()}\n" for path in files)
     (folder / CHECKSUMS).write_bytes("".join(lines).encode())
     return folder / CHECKSUMS
 
 
 def settings_of(folder: Path) -> dict[str, str]:
-    """The settings of a build, such as the kind of the FMUs, from its folder."""
+    """Read the settings of a build, such as the kind of the FMUs, from its folder."""
     content = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     return dict(content["settings"])
 
@@ -124,22 +129,14 @@ def settings_of(folder: Path) -> dict[str, str]:
 def run_fmus(
     module: str, folder: Path, *options: str, hear: Callable[[str], None] = lambda line: None
 ) -> list[str]:
-    """Run a module of the package fmus that writes into a folder.
+    """Run a module of the package fmus, such as `build`, that writes into a folder.
 
-    In a separate process: modules that PythonFMU imports to build must not stay in this one.
-
-    Args:
-        module: its name there.
-        folder: that it writes into.
-        options: of its command line.
-        hear: called with each line of its output as it comes.
-
-    Returns:
-        These lines.
+    It runs in a separate process, because PythonFMU imports modules of the user to build. `hear` is
+    called with each line of its output as it comes; the lines are returned.
 
     Raises:
-        BuildFailed: it failed for what is in a user's script.
-        InputError: it failed for anything else.
+        BuildFailed: it failed because of a user's script.
+        InputError: it failed for another reason.
 
     """
     try:
@@ -154,11 +151,11 @@ def run_fmus(
 
 @cache
 def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
-    """The folder with the FMUs of the installed sources, built if it is not there.
+    """Return the folder with the FMUs of the installed sources; they are built if they are missing.
 
     Args:
-        kind: one of :data:`fmus.kinds.KINDS`, or `auto`: native if they are there or can be
-            built, else Python.
+        kind: one of :data:`fmus.kinds.KINDS`, or `auto`: native if they exist or can be built, else
+            Python.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
 
     Raises:
@@ -185,8 +182,9 @@ def _best_fmus(fmi: str) -> Path:
     if fmi != FMI_VERSIONS[0]:
         # The Python kind has only the first.
         return current_fmus(NATIVE, fmi)
-    if found := _kept(key_of(NATIVE, fmi)):
-        return found
+    for path in read_cached(CATEGORY, key_of(NATIVE, fmi)):
+        # They were built earlier.
+        return path.parent
     try:
         compiler_for(platforms(fmi))
     except (OSError, ValueError):
@@ -194,24 +192,19 @@ def _best_fmus(fmi: str) -> Path:
     try:
         return current_fmus(NATIVE, fmi)
     except InputError as error:
-        # The compiler may be there without the files that it needs.
+        # The compiler may lack files that it needs.
         folder = current_fmus(PYTHON, fmi)
         warnings.warn(f"the Python kind of FMU is used, because {error}", stacklevel=3)
         return folder
 
 
 def key_of(kind: str, fmi: str) -> str:
-    """Cache key of the FMUs that the installed sources give."""
+    """Cache key of the FMUs of the installed sources."""
     return sha256(f"{kind} {fmi} {fingerprint(kind)}".encode()).hexdigest()[:16]
 
 
-def _kept(key: str) -> Path | None:
-    """The folder of FMUs that were built earlier."""
-    return next((path.parent for path in read_cached(CATEGORY, key)), None)
-
-
 def _built(*options: str) -> dict[str, bytes]:
-    """Build FMUs, and return what their files hold, by name."""
+    """Build FMUs, and return the content of the files by name."""
     with temporary_folder() as folder:
         run_fmus("build", folder, *options)
         return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}

@@ -1,13 +1,15 @@
-"""Folders of results, whose files appear all at once and replace only what this program wrote.
+"""Folders of results: files appear all at once and replace only files of this program.
 
 A folder that is written into has a ledger, `.auv-fmu.json`, with the names and digests of its own
-files. Only those are replaced or removed, as long as they are unchanged: all others are the user's.
+files. Only those are replaced or removed, if they are unchanged: all others are the user's.
 
 New files are written into a staging folder within it, named after the ledger's random token. To
 publish them, the ledger lists them, the earlier files move into the staging folder, the new ones
-take their places, and the ledger is written again. Until then the earlier files count: what fails
-or is killed before is undone, at once or by the next process that writes, and a process that only
-reads looks where they are. A failed run replaces no complete one: it goes into `incomplete`.
+move to their places, and the ledger is written again. Until then the earlier files count: a
+publication that fails or is killed is undone, at once or by the next process that writes, and
+readers find the earlier files in the staging folder. A failed run replaces no complete one: it goes
+into `incomplete`.
+
 """
 
 from __future__ import annotations
@@ -29,10 +31,10 @@ from orchestrator.machine.disk import move_aside, sha256_of
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.operating_system import is_mine, sync_to_disk
 
-#: The ledger, and what the names of the staging folder and of the ledger's next version begin with.
+#: The ledger, and the prefix of the staging folder and of the ledger's next version.
 LEDGER, _PREFIX = ".auv-fmu.json", ".auv-fmu-"
 
-#: The record of a result. Removed first and written last: where it is, the result is complete.
+#: The record of a result. Removed first and written last: if it exists, the result is complete.
 RECORD = "run.json"
 
 #: The folder of a failed run beside a complete one, and the page that `auv-fmu view` makes.
@@ -41,16 +43,16 @@ INCOMPLETE, VIEW = "incomplete", "view.html"
 #: The folder of the earlier files, in the staging folder.
 _EARLIER = ".earlier"
 
-#: A ledger is looked for in so many folders above a file, and read up to this length [bytes].
+#: Number of folders above a file that are searched for a ledger, and its largest size [bytes].
 _DEPTH, _LONGEST = 4, 64 * 2**20
 
 
 class Taken(InputError):
-    """A file of the user's has the name of one to be written."""
+    """A file of the user's has the name of a file to be written."""
 
 
 class _Content(NamedTuple):
-    """The random token of a ledger, the digests of its files, and of those being published."""
+    """Random token of a ledger, digests of its files, and digests of files being published."""
 
     token: str
     files: dict[str, str]
@@ -58,21 +60,21 @@ class _Content(NamedTuple):
 
 
 class Ledger:
-    """The ledger of a folder, which must be locked.
+    """The ledger of a locked folder.
 
     Attributes:
         folder: of the ledger.
         token: random, one for each ledger.
-        staging: the folder that new files are written into.
+        staging: the folder for new files.
         moving: digests of files that are being published, by name.
 
     """
 
     def __init__(self, folder: Path, force: bool = False) -> None:
-        """Read the ledger or begin a new one, and undo what a killed process has half done.
+        """Read the ledger or begin a new one, and undo the publication of a killed process.
 
         Args:
-            folder: which exists.
+            folder: an existing folder.
             force: move aside files of the user's that are in the way.
 
         Raises:
@@ -105,10 +107,10 @@ class Ledger:
         return digest is not None and digest in (self._files.get(name), self.moving.get(name))
 
     def check(self, names: Iterable[str]) -> None:
-        """Check that files may be written.
+        """Check that files may be written; with `force`, move aside what is in the way.
 
         Raises:
-            Taken: a file of the user's is in the way, and must not be moved aside.
+            Taken: a file of the user's is in the way.
 
         """
         for name in names:
@@ -124,7 +126,7 @@ class Ledger:
                 move_aside(taken)
 
     def _taken(self, name: str) -> Path | None:
-        """Return what is in the way of a file: one of the user's, or a link on the way."""
+        """Return what is in the way of a file: a file of the user's, or a link."""
         for parent in [*Path(name).parents][-2::-1]:
             path = self.folder / parent
             if path.is_symlink() or (path.exists() and not path.is_dir()):
@@ -134,10 +136,10 @@ class Ledger:
 
     @contextmanager
     def writing(self) -> Iterator[Path]:
-        """Provide the staging folder; what is not published by the end is removed."""
+        """Provide the staging folder; files that are not published by the end are removed."""
         is_new = not self._path.exists()
         if is_new:
-            # So that the next process knows whose the staging folder is.
+            # It tells the next process that the staging folder is not the user's.
             self._write()
         self._discard()
         try:
@@ -160,7 +162,7 @@ class Ledger:
         """Move the files of the staging folder to their places; on failure nothing has changed.
 
         Args:
-            replaced: names of earlier files that go, as far as they are unchanged.
+            replaced: names of earlier files to remove, if they are unchanged.
 
         Raises:
             Taken: a file of the user's is in the way.
@@ -175,7 +177,7 @@ class Ledger:
         if not new and not going:
             return
         try:
-            # Those that are there with the same bytes are owned from here on.
+            # Existing files with the same bytes are owned from here on.
             self.moving = new
             self.check(new)
             self._write()
@@ -199,7 +201,7 @@ class Ledger:
         self._remove_empty_folders(going)
 
     def set_aside(self, place: Path, replaced: Iterable[str]) -> None:
-        """Publish the staging folder by renaming it, and remove what it replaces.
+        """Publish the staging folder by renaming it, and remove the files that it replaces.
 
         Raises:
             OSError: it cannot be renamed.
@@ -213,7 +215,7 @@ class Ledger:
             self.remove(replaced)
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove files that are unchanged, and the folders that are empty then."""
+        """Remove files that are unchanged, and folders that are empty then."""
         names = list(names)
         for name in names:
             if self.owns(name):
@@ -226,7 +228,7 @@ class Ledger:
             self._path.unlink(missing_ok=True)
 
     def _undo(self) -> None:
-        """Put everything back as it was before files were being published."""
+        """Restore the state before a publication."""
         if self.staging.is_dir() and not self.staging.is_symlink():
             for name in self.moving:
                 is_out = _digest_in(self.folder, name) == self.moving[name]
@@ -252,9 +254,9 @@ class Ledger:
                 (self.folder / parent).rmdir()
 
     def _discard(self) -> None:
-        """Remove what nobody else has made, as its name shows."""
+        """Remove the staging folder and partial ledgers, which only this program makes."""
         rmtree(self.staging, ignore_errors=True)
-        # A process that was killed when it began the ledger has left one of another token.
+        # A process that was killed when it began a ledger has left one with another token.
         for partial in self.folder.glob(f"{_PREFIX}{'[0-9a-f]' * 32}.json"):
             with suppress(OSError):
                 partial.unlink()
@@ -278,14 +280,15 @@ def _digest_in(folder: Path, name: str) -> str | None:
 
 
 def _files_in(folder: Path) -> list[str]:
-    """Names of the files in a folder to which no link leads."""
+    """Names of the files in a folder that are not reached by links."""
+    if folder.is_symlink():
+        return []
     names = [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*"))]
-    is_plain = not folder.is_symlink()
-    return [n for n in names if is_plain and not _has_link(folder, n) and (folder / n).is_file()]
+    return [name for name in names if (folder / name).is_file() and not _has_link(folder, name)]
 
 
 def _content(path: Path) -> _Content | None:
-    """Read a ledger; None: there is none, or it is damaged, or somebody else's."""
+    """Read a ledger; None: there is none, or it is damaged, or not from this program."""
     try:
         status = path.lstat()
         if not S_ISREG(status.st_mode) or status.st_size > _LONGEST:
@@ -303,7 +306,8 @@ def _content(path: Path) -> _Content | None:
 def _is_believed(ledger: Path, folder: Path) -> bool:
     """Tell whether a ledger belongs to the user, or to the owner of a folder below it.
 
-    Anybody could put one into a folder that all can write, such as /tmp.
+    Anyone could put one into a folder that all can write, such as /tmp.
+
     """
     if not os.path.lexists(ledger):
         return False
@@ -320,7 +324,7 @@ def _ledgers_of(path: Path) -> Iterator[tuple[Path, str, _Content | None]]:
 
 
 def locate(path: Path) -> Path:
-    """Return where a file is while others are being published: new ones do not count yet."""
+    """Return the path of a file, also during a publication: new files do not count yet."""
     for folder, name, content in _ledgers_of(path):
         if content is not None and content.moving:
             staging = folder / f"{_PREFIX}{content.token}"
@@ -331,7 +335,7 @@ def locate(path: Path) -> Path:
 
 
 def is_changed(path: Path) -> bool:
-    """Tell whether a file was changed since it was written, as far as a ledger says so."""
+    """Tell whether a file was changed since it was written, if a ledger lists it."""
     for _, name, content in _ledgers_of(path):
         if content is None:
             return True
@@ -388,9 +392,9 @@ def replace_files(
 
     Args:
         folder: of the files, made if it does not exist.
-        names: of files that will be written, as far as they are known: they are checked first.
-        force: move aside files of the user's that have names of these.
-        keep: called if they cannot be published, to ask whether to keep them elsewhere.
+        names: files that will be written, if they are known: they are checked first.
+        force: move aside files of the user's with these names.
+        keep: asked, if the files cannot be published, whether to keep them elsewhere.
 
     Raises:
         InputError: the folder cannot be written, a file of the user's is in the way, or another run
@@ -404,7 +408,7 @@ def replace_files(
                 yield staging
                 publish(ledger)
             except (OSError, MemoryError, Taken) as error:
-                rest = _rest(ledger) if keep() and not ledger.moving else ""
+                rest = _keep_files(ledger) if keep() and not ledger.moving else ""
                 raise InputError(_cannot_write(folder, error, rest)) from error
 
 
@@ -415,14 +419,14 @@ def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
     return f"cannot write into {folder}: {reason(error)}{rest}{hint}"
 
 
-def _rest(ledger: Ledger) -> str:
-    """Keep the files that cannot be published; returns where they are, in words."""
+def _keep_files(ledger: Ledger) -> str:
+    """Keep files that cannot be published, and tell where they are."""
     if not ledger.staging.is_dir():
         return ""
     try:
-        # It may say that the run was completed.
+        # It may state that the run was completed.
         (ledger.staging / RECORD).unlink(missing_ok=True)
-        kept = ledger.staging.rename(_beside(ledger.folder))
+        kept = ledger.staging.rename(_free_place(ledger.folder))
     except OSError as error:
         return f"; nor can the files be kept: {reason(error)}"
     return f"; what was written is in {kept}"
@@ -440,25 +444,26 @@ def publish(ledger: Ledger) -> Path:
         replaced = [*map(str, names if isinstance(names, list) else ()), VIEW]
         ledger.publish(replaced if record.get("failure") else replaced + kept)
     else:
-        # Anything but the result of a run, such as an export, replaces no result.
+        # Only a run replaces the result of a run: an export does not.
         ledger.publish()
     return place
 
 
 def place_of(ledger: Ledger) -> Path:
-    """Return where the result in the staging folder goes: a failed one beside a complete one."""
-    has_complete = (ledger.folder / RECORD).is_file() and not _failure(ledger.folder)
-    return _beside(ledger.folder) if has_complete and _failure(ledger.staging) else ledger.folder
+    """Return the folder for the staged result: a failed one does not replace a complete one."""
+    staged, earlier = _record(ledger.staging), _record(ledger.folder)
+    has_complete = (ledger.folder / RECORD).is_file() and not earlier.get("failure")
+    return _free_place(ledger.folder) if has_complete and staged.get("failure") else ledger.folder
 
 
-def _beside(folder: Path) -> Path:
+def _free_place(folder: Path) -> Path:
     """Return the place for a result that must not replace another one."""
     names = chain([INCOMPLETE], (f"{INCOMPLETE}-{n}" for n in count(2)))
     return next(folder / name for name in names if not os.path.lexists(folder / name))
 
 
 def _record(folder: Path) -> dict[str, Any]:
-    """Read the record of a result; empty if there is none, or it is not one of this program."""
+    """Read the record of a result; empty: there is none, or it is not from this program."""
     try:
         record = json.loads((folder / RECORD).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError):
@@ -466,17 +471,8 @@ def _record(folder: Path) -> dict[str, Any]:
     return record if isinstance(record, dict) else {}
 
 
-def _failure(folder: Path) -> object:
-    return _record(folder).get("failure")
-
-
 def inner_folder(folder: Path, *names: str) -> Path:
-    """Return a folder within another one.
-
-    Raises:
-        InputError: it is reached by a link, which could lead anywhere.
-
-    """
+    """Return a folder within another one; an InputError refuses links, which may lead anywhere."""
     for name in names:
         folder /= name
         if folder.is_symlink():

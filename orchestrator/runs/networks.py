@@ -1,11 +1,11 @@
 """Small neural networks as components: from dense layers in a file to the language of equations.
 
 A file is an .onnx, or an .npz with the arrays `W1`, `b1`, `W2`, `b2` ... (a row of W is a neuron)
-and `activations`, a name for each layer; without these, hidden layers have tanh and the last has
-none.
+and `activations`, a name for each layer; default: tanh in hidden layers, none in the last.
 
-An .onnx is a graph of operators. `_OPERATORS` computes each as the ONNX standard says; others are
+An .onnx is a graph of operators. `_OPERATORS` computes each as in the ONNX standard; others are
 refused by name.
+
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ import numpy as np
 from fmus.ports.port import FAULT, H_MAX, TIME
 from orchestrator.machine.errors import InputError, escape_unprintable, reason
 
-#: Activations of a sum z, in the language of equations; {} are numbers.
+#: Activations of a sum z, in the language of equations; {} stands for a number.
 _ACTIVATIONS = {
     "none": "z",
     "tanh": "tanh(z)",
     "relu": "z if z > 0.0 else 0.0",
-    # The form whose exp cannot overflow.
+    # In this form, exp cannot overflow.
     "sigmoid": "1.0 / (1.0 + exp(-z)) if z >= 0.0 else exp(z) / (1.0 + exp(z))",
     "softplus": "max(z, 0.0) + log1p(exp(-abs(z)))",
     "elu": "z if z > 0.0 else {} * expm1(z)",
@@ -40,10 +40,10 @@ _ACTIVATIONS = {
     "at most": "min(z, {})",
 }
 
-#: The names in an .npz: activations without numbers.
+#: Activations in an .npz: the ones without numbers.
 ACTIVATIONS = tuple(name for name, text in _ACTIVATIONS.items() if "{" not in text)
 
-#: Limit of a network, for the length of its text.
+#: Limit of weights, for the length of the text.
 MOST_WEIGHTS = 100_000
 
 #: Limit of the language of equations for a matrix.
@@ -52,10 +52,10 @@ MOST_OF_A_LAYER = 65_536
 #: Limit of inputs and neurons: each takes up to 8 of the numbers that a call of C may hold.
 MOST_NEURONS = 4096
 
-#: The largest number of single precision stands for no bound.
+#: The largest number in single precision, which stands for no bound.
 _FLOAT_MAX = float(np.finfo(np.float32).max)
 
-#: The activations of ONNX, with the attributes or inputs of their numbers, and defaults.
+#: Activations of ONNX: our name, and the attributes or inputs of their numbers with defaults.
 _OF_ONNX: dict[str, tuple[str, dict[str, float]]] = {
     "Tanh": ("tanh", {}),
     "Relu": ("relu", {}),
@@ -76,7 +76,7 @@ _INTEGERS = {6: np.int32, 7: np.int64}
 #: Earlier opsets have other operators by the same names; later ones are not known here.
 _OLDEST_OPSET, _NEWEST_OPSET = 7, 28
 
-#: Ports that every component has, or any may have.
+#: Ports that every component has, or may have.
 _PORTS_OF_ALL = (FAULT.name, H_MAX, TIME.name)
 
 _WIDTH = 98
@@ -88,7 +88,7 @@ class Dense(NamedTuple):
     W: Any  #: array of neurons by inputs
     b: Any  #: array of neurons
     activation: str
-    numbers: Sequence[float] = ()  #: of the activation
+    numbers: Sequence[float] = ()  #: parameters of the activation
 
     @property
     def is_activation(self) -> bool:
@@ -98,7 +98,7 @@ class Dense(NamedTuple):
 
 
 class Network(NamedTuple):
-    """Dense layers, one after the other."""
+    """Consecutive dense layers."""
 
     layers: Sequence[Dense]
     inputs: str  #: their name in the file
@@ -106,28 +106,28 @@ class Network(NamedTuple):
 
     @property
     def input_port(self) -> str:
-        """The group of ports of its inputs."""
+        """Name of the group of ports of its inputs."""
         return _port(self.inputs, "x")
 
     @property
     def output_port(self) -> str:
-        """The group of ports of its outputs."""
+        """Name of the group of ports of its outputs."""
         port = _port(self.outputs, "y")
         return f"{port}_out" if port == self.input_port else port
 
     @property
     def n_inputs(self) -> int:
-        """The number of its inputs."""
+        """Number of inputs."""
         return int(self.layers[0].W.shape[1])
 
     @property
     def n_outputs(self) -> int:
-        """The number of its outputs."""
+        """Number of outputs."""
         return int(self.layers[-1].W.shape[0])
 
 
 def read_network(path: Path) -> Network:
-    """The network in a file.
+    """Read the network in a file.
 
     Raises:
         InputError: it cannot be read, or has layers that are not dense.
@@ -151,7 +151,7 @@ def read_network(path: Path) -> Network:
 
 
 def _check(network: Network) -> None:
-    """Refuse layers that do not follow each other, numbers that are not finite, and sizes."""
+    """Check the sizes of layers and that numbers are finite."""
     for i, (layer, following) in enumerate(pairwise(network.layers), start=1):
         if layer.W.shape[0] != following.W.shape[1]:
             raise InputError(
@@ -257,7 +257,7 @@ def _from_onnx(path: Path) -> Network:
 
 
 def _one_row(given: Any) -> tuple[int, ...]:
-    """Declare the input of a graph for one row, where it has several dimensions: its shape."""
+    """Declare the input of a graph for one row if it has several dimensions; return its shape."""
     declared = given.type.tensor_type
     if declared.elem_type not in _FLOATS:
         raise InputError(f"its input {given.name} is not of the type float or double")
@@ -292,7 +292,7 @@ def _without_scalers(nodes: Sequence[Any], make: Any) -> Iterator[Any]:
 
 
 def _known_shape(value: Any) -> tuple[str, tuple[int, ...] | None]:
-    """The name and the shape of a value; None: the shape is unknown before a run."""
+    """Return the name and the shape of a value; None: the shape is not constant."""
     declared = value.type.tensor_type
     sizes = [size.dim_value if size.HasField("dim_value") else -1 for size in declared.shape.dim]
     is_known = declared.HasField("shape") and -1 not in sizes
@@ -300,7 +300,7 @@ def _known_shape(value: Any) -> tuple[str, tuple[int, ...] | None]:
 
 
 def _needed(graph: Any) -> Sequence[Any]:
-    """The nodes that the output depends on, except those of which only a shape is used."""
+    """Return the nodes that the output depends on, without nodes that only give a shape."""
     names, nodes = {graph.output[0].name}, []
     for node in reversed(graph.node):
         if names.intersection(node.output):
@@ -314,15 +314,16 @@ class _Value(NamedTuple):
 
     offset: Any  #: array: the constant, or the value where the layer gives zeros
     slopes: Any = None  #: arrays: how each number of the layer changes it; None: a constant
-    layer: int = 0  #: how many layers are before it
-    is_sum: bool = False  #: whether it has been multiplied by a matrix
+    layer: int = 0  #: number of layers before it
+    is_sum: bool = False  #: True if it was multiplied by a matrix
 
 
 class _Layers:
-    """The layers of a graph, found by evaluating it.
+    """Layers of a graph, found by evaluating it.
 
-    Operators are functions of arrays. An affine function is its offset and its slopes, so an
+    Operators are functions of arrays. An affine function is stored as its offset and its slopes; an
     operator that keeps it affine is evaluated at each of them. An activation ends a layer.
+
     """
 
     def __init__(
@@ -335,11 +336,11 @@ class _Layers:
         self._layers: list[Dense] = []
         self._shapes = shapes
         self._constants = constants
-        self._known = {inputs: self._begun(shape)}
+        self._known = {inputs: self._results(shape)}
 
     def up_to(self, name: str) -> list[Dense]:
-        """All layers up to a value."""
-        rest = self._ended(self._variable(name), "none")
+        """Return all layers up to a value."""
+        rest = self._dense(self._variable(name), "none")
         if not rest.is_activation:
             return [*self._layers, rest]
         if not self._layers:
@@ -380,14 +381,14 @@ class _Layers:
         self._known[output] = value
 
     def _shape(self, name: str, start: int = 0, end: int | None = None) -> _Value:
-        """The shape of a value as numbers."""
+        """Return the shape of a value as numbers."""
         shape = self._known[name].offset.shape if name in self._known else self._shapes.get(name)
         if shape is None:
             raise InputError(f"the shape of {name} is not known before a run")
         return _Value(np.array(shape, dtype=np.int64)[start:end])
 
     def _activated(self, name: str, inputs: Sequence[str], attributes: Mapping[str, Any]) -> _Value:
-        """Evaluate an activation; its numbers may be attributes, or inputs after the first."""
+        """Evaluate an activation; its numbers are attributes, or inputs after the first."""
         word, defaults = _OF_ONNX[name]
         if name in ("Max", "Min"):
             # The variable may be any of the inputs.
@@ -403,10 +404,10 @@ class _Layers:
             if each
         }
         numbers = {**defaults, **attributes, **given}
-        return self._closed(inputs[0], word, tuple(numbers.values()))
+        return self._end_layer(inputs[0], word, tuple(numbers.values()))
 
     def _number(self, name: str) -> float:
-        """A constant whose numbers are all the same."""
+        """Return the number in a constant whose elements are all equal."""
         if self._is_variable(name):
             raise InputError(_PRODUCT)
         numbers = np.unique(self._known[name].offset)
@@ -426,7 +427,7 @@ class _Layers:
         for i in factors if operator.is_sum else ():
             if self._known[inputs[i]].is_sum:
                 # The product of the weights of two layers may be many more numbers.
-                self._known[inputs[i]] = self._closed(inputs[i], "none")
+                self._known[inputs[i]] = self._end_layer(inputs[i], "none")
         values = [self._known[each] if each else None for each in inputs]
         offset = _numbers(function(*(value and value.offset for value in values)))
         if not places:
@@ -454,7 +455,7 @@ class _Layers:
         return self._known[name].slopes is not None
 
     def _variable(self, name: str) -> _Value:
-        """An affine function of the last layer."""
+        """Return an affine function of the last layer."""
         value = self._known.get(name)
         if value is None or value.slopes is None:
             raise InputError(f"{name} does not depend on the network's input")
@@ -462,18 +463,18 @@ class _Layers:
             raise InputError(f"{name} comes from an earlier layer: the network has branches")
         return value
 
-    def _ended(self, value: _Value, activation: str, numbers: Sequence[float] = ()) -> Dense:
+    def _dense(self, value: _Value, activation: str, numbers: Sequence[float] = ()) -> Dense:
         W = value.slopes.reshape(len(value.slopes), -1).T
         return Dense(W, value.offset.ravel(), activation, numbers)
 
-    def _closed(self, name: str, activation: str, numbers: Sequence[float] = ()) -> _Value:
+    def _end_layer(self, name: str, activation: str, numbers: Sequence[float] = ()) -> _Value:
         """End a layer; its results have the shape of its sums."""
         value = self._variable(name)
-        self._layers.append(self._ended(value, activation, numbers))
-        return self._begun(value.offset.shape)
+        self._layers.append(self._dense(value, activation, numbers))
+        return self._results(value.offset.shape)
 
-    def _begun(self, shape: tuple[int, ...]) -> _Value:
-        """The results of the last layer, or the inputs."""
+    def _results(self, shape: tuple[int, ...]) -> _Value:
+        """Return the results of the last layer, or the inputs."""
         n = math.prod(shape)
         if n > MOST_NEURONS:
             raise InputError(f"a row has {n} numbers; it may have {MOST_NEURONS}")
@@ -485,7 +486,7 @@ _PRODUCT = "it multiplies, divides or selects by what depends on the input"
 
 
 def _numbers(array: Any) -> Any:
-    """Numbers of single precision in double precision; integers as they are."""
+    """Convert single to double precision; integers stay as they are."""
     array = np.asarray(array)
     if array.dtype.kind not in "biu" and array.dtype not in (np.float32, np.float64):
         raise InputError(f"numbers of the type {array.dtype} are not supported; export it in float")
@@ -568,12 +569,12 @@ def _batch_normalization(
 
 
 class _Operator(NamedTuple):
-    """An operator, and where its inputs may depend on those of the network."""
+    """An operator, and its inputs that may depend on the inputs of the network."""
 
     function: Callable[..., Any]
-    factors: Sequence[int] = ()  #: places of inputs of which one may depend on them
-    terms: Sequence[int] = ()  #: places of inputs that are added
-    is_sum: bool = False  #: whether it multiplies matrices
+    factors: Sequence[int] = ()  #: indices of inputs; only one of them may depend
+    terms: Sequence[int] = ()  #: indices of inputs that are added
+    is_sum: bool = False  #: True if it multiplies matrices
 
 
 _OPERATORS = {
@@ -604,12 +605,12 @@ _OPERATORS = {
 
 
 def component_text(name: str, network: Network, source: str) -> str:
-    """The text of a component that computes a network.
+    """Write the text of a component that computes a network.
 
     Args:
-        name: of the component, as a class is named.
+        name: of the class.
         network: of dense layers.
-        source: name of the file that it comes from.
+        source: name of the network's file.
 
     """
     sizes = [network.n_inputs, *(len(layer.W) for layer in network.layers)]
@@ -639,7 +640,7 @@ def component_text(name: str, network: Network, source: str) -> str:
 
 
 def _in_docstring(name: str) -> str:
-    """The name of a file in a docstring, in backticks."""
+    """Escape the name of a file for a docstring, in backticks."""
     shown = escape_unprintable(name).replace("`", "'")
     return shown.replace("\\", r"\\").replace('"', r"\"")
 
@@ -659,7 +660,7 @@ def _constants(i: int, layer: Dense) -> Iterator[str]:
 
 
 def _lines(numbers: Any) -> str:
-    """Numbers as a tuple, in lines."""
+    """Write numbers as a tuple, in lines."""
     text = ", ".join(repr(float(x)) for x in numbers)
     text = f"({text},)" if len(numbers) == 1 else f"({text})"
     return "\n ".join(textwrap.wrap(text, _WIDTH - 10, break_on_hyphens=False))
@@ -667,19 +668,19 @@ def _lines(numbers: Any) -> str:
 
 _CLASSES = '''\
 class Inputs(NamedTuple):
-    """What the network sees."""
+    """Inputs of the network."""
 
     {inputs}: Annotated[Vector, {n}, Variable("", "Input of the network")]
 
 
 class Outputs(NamedTuple):
-    """What it answers."""
+    """Outputs of the network."""
 
     {outputs}: Annotated[Vector, {m}, Variable("", "Output of the network")]
 
 
 def outputs(inputs: Inputs) -> Outputs:
-    """What it answers to its inputs."""
+    """Compute the outputs."""
     return Outputs(_network(inputs.{inputs}))'''
 
 

@@ -1,6 +1,7 @@
 """Components of the user's own: templates, and their FMUs.
 
-`auv-fmu new` writes a folder from the templates, `auv-fmu build` builds what is in it.
+`auv-fmu new` writes a folder from the templates, `auv-fmu build` builds the FMU of its script.
+
 """
 
 from __future__ import annotations
@@ -35,17 +36,17 @@ _EXAMPLES = {
 }
 LIKENESSES = tuple(_EXAMPLES)
 
-#: Time between two looks at files [s].
+#: Time between two checks for changes [s].
 _INTERVAL = 0.2
 
 
 def new_controller(name: str, folder: Path | None = None, *, python: bool = False) -> list[Path]:
-    """Make a folder with a controller that runs in the closed loop.
+    """Create a folder with a controller that runs in the closed loop.
 
     Args:
         name: of the controller, `MyLaw` or `my_law`.
         folder: made if it does not exist; None: one with the name of its module.
-        python: make it a class of PythonFMU in any Python, instead of a component in the language
+        python: write a class of PythonFMU in any Python, instead of a component in the language
             of equations.
 
     Returns:
@@ -76,7 +77,7 @@ def new_component(
     like: str = LIKENESSES[0],
     network: Path | None = None,
 ) -> list[Path]:
-    """Make a folder with a component, whose file becomes both kinds of FMU.
+    """Create a folder with a component, whose file becomes both kinds of FMU.
 
     Args:
         name: of the component, `WaterTank` or `water_tank`.
@@ -120,19 +121,19 @@ def _template(file: str) -> str:
 
 
 def _write(folder: Path, texts: Mapping[str, str], names: Mapping[str, str]) -> list[Path]:
-    """Write texts into a new folder, with other names in them."""
+    """Write texts into a new folder, and replace names in them."""
     if folder.is_dir() and any(folder.iterdir()):
         raise InputError(f"{folder}: is not empty; choose a new or empty folder")
-    with replace_files(folder, texts) as unfinished:
+    with replace_files(folder, texts) as staging:
         for target, text in texts.items():
             for name, own in names.items():
                 text = text.replace(name, own)
-            (unfinished / target).write_text(text, encoding="utf-8")
+            (staging / target).write_text(text, encoding="utf-8")
     return [folder / target for target in texts]
 
 
 def _names(name: str, what: str) -> tuple[str, str]:
-    """Names of the module and of the class.
+    """Return the names of the module and of the class of a component.
 
     Raises:
         InputError: Python does not allow them, or has such a module already.
@@ -148,8 +149,8 @@ def _names(name: str, what: str) -> tuple[str, str]:
     class_name = name if name[0].isupper() else "".join(word.capitalize() for word in words)
     for word in (module, class_name):
         if keyword.iskeyword(word):
-            raise InputError(f"{name!r}: {word} is a word of Python; choose another name")
-    # A module that the user has in this process already is not Python's.
+            raise InputError(f"{name!r}: {word} is a keyword of Python; choose another name")
+    # Not sys.modules: a module of the user's may be imported there already.
     if module in sys.stdlib_module_names or PathFinder.find_spec(module):
         raise InputError(f"{name!r}: {module} is already a module of Python; choose another name")
     return module, class_name
@@ -166,10 +167,10 @@ def build_own(
     """Build the FMU of a user's component.
 
     Args:
-        script: a component in one Python file, a script with a slave of PythonFMU, or a folder
-            with one of them.
-        folder: of the FMU, which gets the name of the component; None: the script's own.
-        force: move aside a file of the user's that has the name of the FMU.
+        script: a component in one Python file, a script with a slave of PythonFMU, or a folder with
+            one of them.
+        folder: of the FMU, which is named after the component; None: the script's own.
+        force: move aside a file of the user's with the name of the FMU.
         hear: called with a line when a library is made.
         form: of the FMU.
 
@@ -182,7 +183,7 @@ def build_own(
         own = script if script.is_dir() else script.parent
         place = own if folder is None else folder
         try:
-            run_fmus("build", temporary, *options, *_home(own, place), hear=hear)
+            run_fmus("build", temporary, *options, *_from_option(own, place), hear=hear)
         except BuildFailed as error:
             removed = [path.name for path in _built_from(script, place)]
             for name in removed:
@@ -190,15 +191,16 @@ def build_own(
             gone = f"; {', '.join(removed)} of an earlier build is removed" * bool(removed)
             raise InputError(f"{error}{gone}") from None
         [built] = temporary.glob("*.fmu")
-        with replace_files(place, [built.name], force=force) as unfinished:
-            shutil.copyfile(built, unfinished / built.name)
+        with replace_files(place, [built.name], force=force) as staging:
+            shutil.copyfile(built, staging / built.name)
     return place / built.name
 
 
-def _home(script: Path, fmu: Path) -> Sequence[str]:
-    """The option with the path to the folder of a script from that of its FMU, for its record.
+def _from_option(script: Path, fmu: Path) -> Sequence[str]:
+    """Return the option that records the path from an FMU to the folder of its script.
 
-    It is left out where it would name folders outside of the project, which is the current folder.
+    It is omitted if a folder is outside of the project, which is the current folder.
+
     """
     here, folders = Path.cwd(), (script.resolve(), fmu.resolve())
     is_within = all(here in (folder, *folder.parents) for folder in folders)
@@ -206,7 +208,7 @@ def _home(script: Path, fmu: Path) -> Sequence[str]:
 
 
 def _built_from(script: Path, folder: Path) -> Iterator[Path]:
-    """The FMUs in a folder that were built from a script, under the names of the build."""
+    """Find FMUs in a folder that were built from a script and have kept their names."""
     names = [script.name]
     if script.is_dir():
         names = [f"{script.resolve().name}.py", ""]
@@ -233,7 +235,7 @@ def changes(script: Path) -> Iterator[None]:
 
 
 def _versions(script: Path) -> dict[Path, tuple[int, int]]:
-    """The modules beside a script, and in folders beside it, as they are now."""
+    """Return times and sizes of the modules of a script, beside it and in folders beside it."""
     folder = script if script.is_dir() else script.parent
     versions = {}
     for path in (*folder.glob("*.py"), *folder.glob("*/*.py")):

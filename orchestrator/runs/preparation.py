@@ -1,16 +1,26 @@
-"""A run that is ready to be made, with the user's changes, and its companion."""
+"""From the name of a system to a run that is ready to be made.
+
+:func:`load_scenario` reads a scenario of the bundle, or a file that contains its own FMUs;
+:func:`prepare` applies the user's changes, and :func:`with_companion` adds the run that a scenario
+is compared with.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+import warnings
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from auv_fmu.paper.euler import STEP
+from fmus.discovery import ORIGIN, origin_of
+from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, FmiVersion, KindName
 from orchestrator.cosim import (
     Alter,
+    Component,
     Ending,
     Event,
     Events,
@@ -24,41 +34,249 @@ from orchestrator.cosim import (
     Set,
     System,
     make_plan,
+    read_component,
+    read_osp,
+    read_ssp,
     simulate_plan,
 )
+from orchestrator.figures.run_figures import check_figure
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import Identity
+from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.loading import doubts_of, first_given, load_scenario
-from orchestrator.runs.request import Request
+from orchestrator.runs.request import Request, SimulateOptions
 from orchestrator.runs.scenario import (
     Inputs,
     Scenario,
     check_events,
+    names,
     read_events,
     read_inputs,
     read_scenario,
+    scenario_of,
     shared_events,
 )
-from orchestrator.runs.wiring import closed_loop, read_wiring
+from orchestrator.runs.wiring import check_built, closed_loop, read_wiring
+from orchestrator.vehicle.cautions import differing_vehicle
 from orchestrator.vehicle.signals import Loop, loops_of
 
-#: Communication step of the paper [s], for systems that name none.
+T = TypeVar("T")
+
+#: Communication step of the paper [s], for systems without a step.
 DEFAULT_STEP = STEP
 
-#: Stop time of a system that names none, where it is only checked or exported [s].
+#: Stop time of a system without one, if it is only checked or exported [s].
 FALLBACK_STOP_TIME = 1.0
+
+# Loading
+
+
+def load(
+    name: str | Path | Mapping[str, Any],
+    kind: KindName = AUTO,
+    *,
+    fmi: FmiVersion = FMI_VERSIONS[0],
+    variant: str | None = None,
+    strict: bool = False,
+) -> System:
+    """Read the system of a scenario, of an SSP or of another file, with its experiment.
+
+    Harmless flaws give a warning.
+
+    Args:
+        name: name of a scenario, path of a .toml file, an SSP, an FMU or libcosim's
+            OspSystemStructure.xml, or a dictionary with the entries of a scenario file. An
+            unpacked SSP and the folder of an OspSystemStructure.xml also work.
+        kind: kind of the bundle's FMUs: `python`, `native`, or `auto`, native where available.
+        fmi: their version of FMI, `2` or `3`.
+        variant: name of a system description in an SSP; None: the default.
+        strict: treat warnings as errors.
+
+    Raises:
+        InputError: there is no such scenario, or its system cannot be put together.
+
+    """
+    findings = Findings(strict)
+    scenario, system = load_scenario(name, kind, fmi, variant, findings)
+    lost = left_behind(scenario)
+    warn_of(findings, [lost] if lost else doubts_of(system))
+    return replace(
+        system,
+        name=scenario.name,
+        stop_time=first_given(scenario.stop_time, system.stop_time),
+        step=first_given(scenario.step, system.step),
+    )
+
+
+def warn_of(findings: Findings, notes: Sequence[str], stacklevel: int = 3) -> None:
+    """Add notes to findings and give all as Python's warnings, for the caller of the caller.
+
+    Raises:
+        Refused: the findings have problems.
+
+    """
+    for note in notes:
+        findings.note(note)
+    findings.refuse()
+    for note in findings.notes:
+        warnings.warn(note, stacklevel=stacklevel)
+
+
+def load_scenario(
+    name: str | Path | Mapping[str, Any],
+    kind: str = AUTO,
+    fmi: str = FMI_VERSIONS[0],
+    variant: str | None = None,
+    findings: Findings | None = None,
+) -> tuple[Scenario, System]:
+    """Load a scenario, with a value for each port, and its system.
+
+    Args:
+        name, kind, fmi, variant: as in :func:`load`.
+        findings: takes flaws; None: harmless flaws are ignored, and an FMU that is older than its
+            script gives a warning.
+
+    Raises:
+        InputError: there is no such scenario, or its system cannot be put together.
+
+    """
+    path = None if isinstance(name, Mapping) else Path(name)
+    read = None if path is None else _reader(path)
+    if variant is not None and read is not read_ssp:
+        what = "a dictionary" if path is None else f"{name}:"
+        raise InputError(f"{what} has no variants; only an SSP can have them")
+    if path is None or read is None:
+        scenario = scenario_of(name) if isinstance(name, Mapping) else read_scenario(str(name))
+        check_figure(scenario.figure)
+        system = closed_loop(current_fmus(kind, fmi), scenario)
+        scenario = replace(scenario, parameters=system.expanded(scenario.parameters))
+    else:
+        check_brings_its_own(str(name), kind, fmi)
+        system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
+        named = path.resolve().parent if path.name in _STRUCTURES else path.resolve()
+        scenario = Scenario(named.stem, title=path.name or named.name)
+    for text in filter(None, map(outdated, system.components.values())):
+        if findings is None:
+            warnings.warn(text, stacklevel=2)
+        else:
+            findings.note(text)
+    return scenario, system
+
+
+def outdated(component: Component) -> str | None:
+    """Warn that the FMU of a user's script is older than the script; None: it is not."""
+    record = component.folder / ORIGIN
+    origin = origin_of(record.read_bytes()) if record.is_file() else None
+    # An FMU that was renamed is kept on purpose, beside a newer script.
+    if origin is None or component.fmu.name != origin.fmu:
+        return None
+    changed = origin.changed(component.fmu)
+    if not changed:
+        return None
+    command = f"auv-fmu build {origin.place(component.fmu) / origin.script}"
+    command += f" --kind {NATIVE}" * (origin.kind == NATIVE)
+    command += " --fmi 3" * (component.description.fmiMajorVersion == 3)
+    command += f" --out {component.fmu.parent}" * (origin.folder != ".")
+    return (
+        f"{component.name}: {component.fmu} is older than {changed[0]}; build it again ({command}) "
+        "or give it another name"
+    )
+
+
+def read_fmu(path: Path, findings: Findings | None = None) -> System:
+    """Read an FMU as a system of one component, with its default experiment.
+
+    Raises:
+        InputError: the file is missing, or is not an FMU that can be run.
+
+    """
+    name = re.sub(r"\W", "_", path.stem)
+    check_built(path)
+    component = read_component(name, path, findings=findings)
+    return System(
+        name=path.stem,
+        components={name: component},
+        connections=(),
+        start_time=component.experiment("startTime"),
+        stop_time=component.experiment("stopTime"),
+        step=component.step,
+    )
+
+
+#: Names of descriptions in folders: of SSP, and of OSP.
+_STRUCTURES = ("SystemStructure.ssd", "OspSystemStructure.xml")
+
+#: Readers of files other than scenarios, by ending.
+_READERS: Mapping[str, Callable[..., System]] = {
+    ".ssp": read_ssp,
+    ".ssd": read_ssp,
+    ".xml": read_osp,
+    ".fmu": read_fmu,
+}
+
+
+def is_path(name: str) -> bool:
+    """Tell whether a name is a path; otherwise it names a scenario."""
+    return name.endswith((".toml", *_READERS))
+
+
+def _reader(path: Path) -> Callable[..., System] | None:
+    """Return the reader of a file or folder; None: it is a scenario."""
+    if path.suffix in _READERS or str(path) in names() or not is_folder(path):
+        return _READERS.get(path.suffix)
+    of_ssp, of_osp = ((path / name).is_file() for name in _STRUCTURES)
+    return read_osp if of_osp and not of_ssp else read_ssp
+
+
+def brings_its_own(name: str) -> bool:
+    """Tell whether a system contains its own FMUs, so that there is no choice of kind."""
+    return _reader(Path(name)) is not None
+
+
+def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
+    """Raise an InputError if a kind of FMU is requested of a system with its own FMUs."""
+    if kind == NATIVE or fmi != FMI_VERSIONS[0]:
+        raise InputError(f"{name}: contains its own FMUs; kind and fmi apply only to the bundle's")
+
+
+def left_behind(scenario: Scenario) -> str | None:
+    """Warn of parts of a scenario that are lost if only its system is kept."""
+    has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
+    if not any(has.values()):
+        return None
+    lost = " and ".join(name for name, there in has.items() if there)
+    return f"{scenario.name}: only the system is used, without the scenario's {lost}"
+
+
+def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
+    """Warn of possible omissions: inputs without a source, parameters of a vehicle.
+
+    `given` are inputs that get their values from events or tables.
+
+    """
+    if len(system.components) == 1:
+        # No other component could feed it.
+        return []
+    return [*filter(None, (system.unfed_inputs(given), differing_vehicle(system)))]
+
+
+def first_given(*values: T | None) -> T | None:
+    """Return the first value that is not None."""
+    return next((value for value in values if value is not None), None)
+
+
+# Preparation
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A run that is ready to be made, and the scenario that it comes from.
+    """A run that is ready to be made, and its scenario.
 
     Attributes:
-        scenario: as its file has it, but for events and inputs of the request.
+        scenario: as its file has it, except for events and inputs of the request.
         plan: the system, and its steps.
-        events: that happen to it.
-        input_table: values of inputs over time; None: they keep their values.
+        events: of the run.
+        input_table: values of inputs over time; None: inputs keep their values.
 
     """
 
@@ -69,12 +287,12 @@ class Prepared:
 
     @property
     def system(self) -> System:
-        """What is run."""
+        """The system."""
         return self.plan.system
 
     @property
     def experiment(self) -> Experiment:
-        """Until when it is run, in which steps and which order."""
+        """Times, step and order of the run."""
         return self.plan.experiment
 
     @cached_property
@@ -82,65 +300,60 @@ class Prepared:
         """The loops of its vehicles."""
         return loops_of(self.system)
 
-    def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
-        """Make the run.
+    @property
+    def identity(self) -> Identity:
+        """Everything that decides its rows."""
+        inputs = self.input_table.digest if self.input_table else ""
+        return self.plan.identity(self.events, inputs)
 
-        Args:
-            observers: take its rows.
-            hooks: act on it before its own do.
+    def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
+        """Make the run; `hooks` act before its table of inputs and its events do.
 
         Raises:
             InputError: an FMU or a parameter is not usable; nothing was stepped.
 
         """
-        return simulate_plan(self.plan, observers, [*hooks, *self._hooks()])
+        own: list[Hook] = [] if self.input_table is None else [self.input_table.playback()]
+        own += [Events(self.events)] if self.events else []
+        return simulate_plan(self.plan, observers, [*hooks, *own])
 
     def doubts(self) -> list[str]:
-        """What may have been forgotten, in lines: inputs without a source, a part of a vehicle."""
-        actions = [event.action for event in self.events]
+        """Warn of possible omissions: inputs without a source, parameters of a vehicle."""
         given = {*(self.input_table.targets if self.input_table else ())}
-        given |= {port for one in actions if isinstance(one, Alter) for port, _ in one.values}
-        given |= {port for one in actions if isinstance(one, Set) for port, _ in one.inputs}
+        for action in (event.action for event in self.events):
+            values = action.values if isinstance(action, Alter) else ()
+            values = action.inputs if isinstance(action, Set) else values
+            given |= {port for port, _ in values}
         return doubts_of(self.system, given)
 
-    @property
-    def identity(self) -> Identity:
-        """All that its rows depend on."""
-        inputs = self.input_table.digest if self.input_table else ""
-        return self.plan.identity(self.events, inputs)
-
-    def _hooks(self) -> list[Hook]:
-        playing: list[Hook] = [] if self.input_table is None else [self.input_table.playback()]
-        return playing + ([Events(self.events)] if self.events else [])
-
     def missed(self, ending: Ending) -> list[Event]:
-        """The events that have not happened in a run of it."""
+        """Return the events that have not happened in a run of it."""
         happened = {occurrence.event for occurrence in ending.events}
         return [event for i, event in enumerate(self.events) if i not in happened]
 
 
 def prepare_request(request: Request) -> Prepared:
-    """Prepare what a request asks for.
+    """Load and prepare the scenario of a request.
 
     Raises:
-        InputError: there is no such scenario, or something about the request cannot be done.
+        InputError: there is no such scenario, or the request cannot be met.
 
     """
     return prepare(*load_scenario(request.scenario, request.kind), request)
 
 
-def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
-    """A scenario with the user's changes.
+def prepare(scenario: Scenario, system: System, request: Request | SimulateOptions) -> Prepared:
+    """Apply a request to a scenario and its system.
 
     Raises:
-        InputError: something about the request cannot be done.
+        InputError: the request cannot be met.
 
     """
-    findings, values = Findings(request.strict), system.expanded(request.parameters)
+    findings, values = Findings(request.strict), system.expanded(request.parameters or {})
     system = system.with_parameters(values)
-    input_table = None
     if request.inputs is not None:
         scenario = replace(scenario, inputs=Inputs(Path(request.inputs), wins=True))
+    input_table = None
     if scenario.inputs is not None:
         given = {*values} if scenario.inputs.wins else {*values, *scenario.parameters}
         with findings.collecting():
@@ -153,7 +366,7 @@ def prepare(scenario: Scenario, system: System, request: Request) -> Prepared:
     stop_time = first_given(request.stop_time, scenario.stop_time, system.stop_time)
     if stop_time is None:
         raise InputError(f"{scenario.name}: has no stop time; set one with --stop-time")
-    system = replace(system, steps={**system.steps, **request.steps})
+    system = replace(system, steps={**system.steps, **(request.steps or {})})
     step = first_given(request.step, scenario.step, system.step)
     if step is None:
         system = system.with_common_step()
@@ -179,19 +392,13 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     the user apply to both runs, where both have such a port.
 
     Raises:
-        InputError: something about the request cannot be done for the companion.
+        InputError: the request cannot be met by the companion.
 
     """
     scenario, difference = prepared.scenario, prepared.scenario.compare
     if difference is None:
         return [prepared]
     standard = read_wiring(scenario.vehicles)["wires"]
-    wires = {
-        target: source
-        for target, source in {**scenario.wires, **difference.wires}.items()
-        # A wire of the scenario's own is removed by not being there.
-        if source is not False or target in standard or target not in scenario.wires
-    }
     companion = replace(
         scenario,
         name=difference.name,
@@ -199,7 +406,12 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         title=f"{scenario.title or scenario.name} ({difference.label or difference.name})",
         compare=None,
         components={**scenario.components, **difference.components},
-        wires=wires,
+        wires={
+            target: source
+            for target, source in {**scenario.wires, **difference.wires}.items()
+            # A wire that only the scenario has is removed by leaving it out.
+            if source is not False or target in standard or target not in scenario.wires
+        },
         only=scenario.only and [*scenario.only, *difference.components],
         parameters={},
     )

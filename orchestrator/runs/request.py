@@ -1,7 +1,8 @@
 """Options of a run, each declared once: its type, its default and its help.
 
-The fields of these dataclasses are the options of the command line (`commands/options.py`), and
-those of :class:`Options` also keywords of `simulate`, with one help text for both.
+The fields of these dataclasses are the options of the command line (`commands/options.py`); the
+fields of :class:`Options` are also keywords of `simulate`, with the same help.
+
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import shlex
 import textwrap
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import KW_ONLY, dataclass, field, fields
 from functools import wraps
 from inspect import signature
 from pathlib import Path
@@ -24,6 +25,7 @@ from orchestrator.cosim import (
     Plan,
     RealTime,
     Selection,
+    System,
     TableFile,
 )
 from orchestrator.machine.texts import literal
@@ -39,10 +41,10 @@ def option(
     """Declare a field of a dataclass as an option.
 
     Args:
-        default: its value where the user gives none.
+        default: its default.
         text: its help, on the command line and in Python.
-        is_flag: whether it is an option of the command line.
-        is_hashed: whether it counts in the hash of the object.
+        is_flag: True if it is an option of the command line.
+        is_hashed: True if it counts in the hash of the object.
         how: arguments of `add_argument` that do not follow from the type of the field.
 
     """
@@ -53,23 +55,22 @@ def option(
 
 
 def flags(declared: type[Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
-    """The options of the command line among the fields of a dataclass.
+    """Find the options of the command line among the fields of a dataclass.
 
     Yields:
         The name of a field, its flag, and the arguments of `add_argument`.
 
     """
     hints = get_type_hints(declared)
-    for one in fields(declared):
-        if one.metadata.get("is_flag"):
-            how = {**_read_as(hints[one.name]), **one.metadata["how"]}
-            text = one.metadata["help"]
-            flag = "--" + one.name.replace("_", "-")
-            yield one.name, flag, {"default": one.default, "help": text, **how}
+    for name, entry in declared.__dataclass_fields__.items():
+        if entry.metadata.get("is_flag"):
+            how = {**_read_as(hints[name]), **entry.metadata["how"]}
+            flag = "--" + name.replace("_", "-")
+            yield name, flag, {"default": entry.default, "help": entry.metadata["help"], **how}
 
 
 def _read_as(hint: Any) -> dict[str, Any]:
-    """The arguments of `add_argument` that follow from a type."""
+    """Derive the arguments of `add_argument` from a type."""
     for kind in [hint] if get_origin(hint) is Literal else get_args(hint) or [hint]:
         if kind is bool:
             return {"action": "store_true"}
@@ -87,17 +88,18 @@ def takes_keywords(
 ) -> Callable[[Callable[[T], R]], Callable[P, R]]:
     """Let a function of a dataclass take the fields of the dataclass as arguments.
 
-    Signature, type hints and docstring become those of a function with these arguments; in the
-    docstring, `{arguments}` stands for their help.
+    Its signature, type hints and docstring list these arguments; in the docstring, `{arguments}`
+    stands for their help.
+
     """
     hints, shown = get_type_hints(declared), signature(declared)
-    texts = {one.name: one.metadata["help"] for one in fields(declared)}  # type: ignore[arg-type]
+    texts = {entry.name: entry.metadata["help"] for entry in fields(declared)}  # type: ignore[arg-type]
     described, parameters = [], []
-    for name, one in shown.parameters.items():
+    for name, parameter in shown.parameters.items():
         described.append(textwrap.fill(f"{name}: {texts[name]}.", 92, subsequent_indent=" " * 4))
         # A dataclass shows a placeholder for a new mapping.
-        default = {} if repr(one.default) == "<factory>" else one.default
-        parameters.append(one.replace(annotation=hints[name], default=default))
+        default = {} if repr(parameter.default) == "<factory>" else parameter.default
+        parameters.append(parameter.replace(annotation=hints[name], default=default))
 
     def decorate(function: Callable[[T], R]) -> Callable[P, R]:
         arguments = textwrap.indent("\n".join(described), " " * 8).lstrip()
@@ -121,7 +123,7 @@ def takes_keywords(
     return decorate
 
 
-#: The help of options that not only runs have.
+#: Help of options that studies have, too.
 KIND = (
     "kind of the bundle's FMUs: python (source code) or native (its translation to C), with the "
     f"same numbers; default: {AUTO} (native if it is present or can be built)"
@@ -131,12 +133,14 @@ LOOP = (
     "available)"
 )
 FORCE = "rename your own files that are in the way to NAME.~1~; default: stop"
-CHECKPOINT_EVERY = "time between checkpoints [simulated s]; default: none, or as before if resumed"
+CHECKPOINT_EVERY = (
+    "time between checkpoints [simulated s]; default: none; for a resumed run, the same again"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Options of every run; None: as the scenario has it."""
+    """Options of every run; None: the scenario's."""
 
     stop_time: float | None = option(None, "end of the run [s]; default: the scenario's")
     step: float | None = option(
@@ -193,11 +197,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Request(Options):
-    """A scenario, and what the user changes of it.
+    """A scenario, and the user's changes.
 
     Attributes:
-        scenario: its name, or the path of a file; empty where a system is given instead.
-        parameters: values in place of the scenario's, by `component.parameter`.
+        scenario: its name, or the path of a file; empty if a system is given instead.
+        parameters: values that replace the scenario's, by `component.parameter`.
 
     """
 
@@ -206,7 +210,7 @@ class Request(Options):
 
     @property
     def label(self) -> str:
-        """Its words after `auv-fmu run`, then in parentheses what the command line has not."""
+        """Words after `auv-fmu run`; in parentheses, changes that the command line cannot make."""
         words = [self.scenario]
         rest = {"steps": ", ".join(f"{name} = {_text(h)} s" for name, h in self.steps.items())}
         for name, flag, how in flags(Request):
@@ -214,7 +218,7 @@ class Request(Options):
             if value == how["default"]:
                 continue
             if name == "events" and not isinstance(value, str):
-                # Tables; the option takes the scenario that has them.
+                # The option takes the name of a scenario, not tables.
                 rest[name] = ", ".join(map(str, value)) or "none"
                 continue
             words.append(flag)
@@ -227,11 +231,43 @@ class Request(Options):
 
 
 @dataclass(frozen=True)
+class SimulateOptions(Options):
+    """Arguments of :func:`.run.simulate`."""
+
+    system: str | Path | Mapping[str, Any] | System = field(
+        metadata={
+            "help": "name of a scenario, path of a file such as .toml or .ssp, a dictionary with "
+            "the entries of a scenario file, or a system from `load`"
+        }
+    )
+    parameters: Mapping[str, object] | None = option(
+        None,
+        "values in place of the scenario's, by `component.parameter`: numbers, Booleans, names, or "
+        "text as on the command line; for a group, such as `plant.eta0`, a list with a value for "
+        "each member",
+    )
+    _: KW_ONLY
+    progress: bool = option(False, "show a bar on runs that take longer than some seconds")
+    variant: str | None = option(None, "name of a system description in an SSP")
+    checkpoint: str | Path | None = option(
+        None,
+        "folder for checkpoints, from which another process can continue the run; it is removed "
+        "when the run is complete",
+    )
+    checkpoint_every: float | None = option(None, CHECKPOINT_EVERY)
+    resume: bool = option(
+        False,
+        "continue from the last checkpoint. The result has all rows, as if the run had not been "
+        "interrupted; its `resumed_at` has the time at which it continued",
+    )
+
+
+@dataclass(frozen=True)
 class Files:
-    """Files of a run, and what is only for a run that writes files.
+    """Options of a run that writes files.
 
     Raises:
-        InputError: an interval or a factor makes no sense.
+        InputError: an interval or a factor is not positive.
 
     """
 
@@ -262,7 +298,7 @@ class Files:
 
 
 def _text(value: Any) -> str:
-    """The shortest text that is read back as the same value."""
+    """Return the shortest text that is read back as the same value."""
     if isinstance(value, str | Path):
         return str(value)
     return literal(value).removesuffix(".0") if isinstance(value, float) else literal(value)

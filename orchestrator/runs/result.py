@@ -1,4 +1,4 @@
-"""A result: its record `run.json`, its table and indices, in memory and in files."""
+"""A result: its table, its indices in metrics.json and its record run.json; read and written."""
 
 from __future__ import annotations
 
@@ -82,11 +82,11 @@ class Parameters(Mapping[Any, Any]):
     """Values of the parameters of all components, by `component.parameter`."""
 
     def __init__(self, values: Mapping[PortName, Any]) -> None:
-        """Take the values as the FMUs reported them."""
+        """Take the values that the FMUs reported."""
         self._values = {str(name): value for name, value in values.items()}
 
     def __getitem__(self, name: str | PortName) -> Any:
-        """The value of one parameter.
+        """Return the value of one parameter.
 
         Raises:
             KeyError: there is no such parameter; the text has a suggestion.
@@ -121,14 +121,7 @@ class Result(Table):
     def __init__(
         self, scenario: Scenario, loops: Sequence[Loop], prepared: Prepared | None = None
     ) -> None:
-        """Take the rows of a run.
-
-        Args:
-            scenario: that is run, as far as figures need it.
-            loops: of its vehicles.
-            prepared: the run, if it is made in this process.
-
-        """
+        """Begin without rows; `prepared` is the run, if it is made in this process."""
         super().__init__()
         self.resumed_at: float | None = None
         self._scenario, self._loops, self._clock = scenario, loops, Stopwatch()
@@ -136,7 +129,7 @@ class Result(Table):
         self._file, self._record = Path(), dict[str, Any]()
 
     def __repr__(self) -> str:
-        """One line: the scenario, and how far it came."""
+        """Show the scenario and the computed rows in one line."""
         end = f", {self.failure}" if self.failure else ""
         first, last = (self.time[0], self.time[-1]) if len(self) else (0.0, 0.0)
         order = Experiment.format_order(self.header.experiment.order)
@@ -146,7 +139,7 @@ class Result(Table):
         )
 
     def _repr_html_(self) -> str:
-        """Show it in a notebook, with the indices."""
+        """Show the indices in a notebook."""
         rows = []
         with suppress(InputError):
             for vehicle, title, numbers in summary(self.metrics()):
@@ -182,7 +175,7 @@ class Result(Table):
         return self.ending.events
 
     def metrics(self) -> dict[str, Any]:
-        """The indices, as in metrics.json."""
+        """Return the indices, as in metrics.json."""
         if self._prepared is None:
             # The stored table may have fewer rows and columns than the run.
             return read_metrics(locate(self._file.with_name(METRICS)))
@@ -190,7 +183,7 @@ class Result(Table):
         return indices.content(self._scenario.name, self._prepared.system)
 
     def to_dataframe(self) -> pd.DataFrame:
-        """All columns as a pandas DataFrame, with the time as its index.
+        """Return all columns as a pandas DataFrame, with the time as its index.
 
         Raises:
             ImportError: pandas is not installed.
@@ -260,8 +253,7 @@ class Result(Table):
         Args:
             folder: made if it does not exist; an earlier result in it is replaced.
             format: of the table, `csv` or `parquet`.
-            force: move aside your files with names of its files; without it they stay, and nothing
-                is written.
+            force: rename your own files that are in the way; without it nothing is written then.
 
         Returns:
             The folder.
@@ -273,19 +265,24 @@ class Result(Table):
         if format not in TableFile.FORMATS:
             raise InputError(f"format {format!r}: use one of {', '.join(TableFile.FORMATS)}")
         folder = Path(folder)
-        with replace_files(folder, FILES, force=force) as unfinished:
-            table = TableFile.at(unfinished / f"result.{format}")
+        with replace_files(folder, FILES, force=force) as staging:
+            table = TableFile.at(staging / f"result.{format}")
             table.begin(self.header)
             table.take(self.rows)
             table.end(self.ending)
-            if self._prepared is not None or self._record:
-                write_metrics(unfinished, self.metrics())
             if self._prepared is not None:
                 write_record(
-                    unfinished, self._prepared, self.header, self.ending, sys.argv, self._clock
+                    staging,
+                    self._prepared,
+                    self.header,
+                    self.ending,
+                    self.metrics(),
+                    sys.argv,
+                    self._clock,
                 )
             elif self._record:
-                copy_record(unfinished, self._record)
+                (staging / METRICS).write_text(in_json(self.metrics()), encoding="utf-8")
+                copy_record(staging, self._record)
         return folder
 
     def _drawn(self) -> Drawn:
@@ -304,23 +301,16 @@ def read(path: str | Path) -> Result:
         ValueError: there is no result, or it cannot be read.
 
     """
-    file = table_in(Path(path))
-    record = read_record(file)
-    for changed in changed_files(file) if record else ():
-        warnings.warn(f"{changed} was changed since the run wrote it", stacklevel=2)
+    file, record, header, blocks = _stored(Path(path))
     shown = {name: record[name] for name in ("title", "label", "z_up", "figure") if name in record}
     result = Result(Scenario(str(record.get("scenario", file.stem)), **shown), loops_in(record))
     result._file, result._record = file, record
-    header, blocks = stored_rows(file, record)
     result.hold(header, np.concatenate(list(blocks)), ending_in(record))
     return result
 
 
 def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
-    """The indices of a run in words.
-
-    Args:
-        values: content of metrics.json.
+    """Describe the content of metrics.json.
 
     Yields:
         The vehicle, empty if there is only one; an index with its members and unit; its numbers.
@@ -338,7 +328,7 @@ def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
 
 
 def _number(value: float) -> str:
-    """Four digits; an exponent only where zeros would be all that is seen."""
+    """Four digits, with an exponent for numbers below 1e-4 and from 1e7 on."""
     if value and not 1e-4 <= abs(value) < 1e7:
         return f"{value:.3e}"
     return np.format_float_positional(value, precision=4, unique=False, fractional=False, trim="-")
@@ -348,7 +338,7 @@ def _number(value: float) -> str:
 
 
 class Stopwatch:
-    """Start and duration; the duration is right even if the clock is set meanwhile."""
+    """Start and duration of a run; setting the clock does not change the duration."""
 
     def __init__(self) -> None:
         """Start now."""
@@ -356,16 +346,11 @@ class Stopwatch:
         self._tick = monotonic()
 
     def times(self) -> dict[str, object]:
-        """The entries of a record about it."""
+        """Return the entries of a record."""
         return {
             "started": self._started.isoformat(timespec="seconds"),
             "seconds": round(monotonic() - self._tick, 3),
         }
-
-
-def write_metrics(folder: Path, values: Mapping[str, Any]) -> None:
-    """Write metrics.json into a folder."""
-    (folder / METRICS).write_text(in_json(values), encoding="utf-8")
 
 
 def read_metrics(path: Path) -> dict[str, Any]:
@@ -389,33 +374,37 @@ def write_record(
     prepared: Prepared,
     header: Header,
     ending: Ending,
+    indices: Mapping[str, Any],
     command: Sequence[str],
     clock: Stopwatch,
     remarks: Mapping[str, object] | None = None,
 ) -> None:
-    """Write the record of a run into the folder of its files.
+    """Write the indices and the record of a run, the last files of its folder.
 
     Args:
         folder: with all other files of the result.
         prepared: the run.
         header, ending: of its table.
+        indices: content of metrics.json.
         command: of the run.
         clock: started with the run.
         remarks: further entries.
 
     """
+    (folder / METRICS).write_text(in_json(indices), encoding="utf-8")
+    scenario, system = prepared.scenario, prepared.system
     content = {
-        "scenario": prepared.scenario.name,
-        "title": prepared.scenario.title,
-        "label": prepared.scenario.label,
-        "z_up": prepared.scenario.z_up,
-        "figure": prepared.scenario.figure,
-        "sha256": prepared.scenario.digest,
+        "scenario": scenario.name,
+        "title": scenario.title,
+        "label": scenario.label,
+        "z_up": scenario.z_up,
+        "figure": scenario.figure,
+        "sha256": scenario.digest,
         "identity": digest_of(prepared.identity),
         "command": list(command),
         **clock.times(),
         **content_of(header, ending, prepared.loops),
-        "experiment": {**vars(header.experiment), "steps": dict(prepared.system.steps)},
+        "experiment": {**vars(header.experiment), "steps": dict(system.steps)},
         **(remarks or {}),
         "fmus": {
             component.name: {
@@ -423,14 +412,14 @@ def write_record(
                 "sha256": component.digest,
                 "kind": PYTHON if component.runs_python else NATIVE,
             }
-            for component in prepared.system.components.values()
+            for component in system.components.values()
         },
     }
     write_content(folder, content)
 
 
 def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[str, object]:
-    """The entries about a table; :func:`header_in`, `ending_in` and `loops_in` read them."""
+    """Entries of a record for :func:`header_in`, :func:`ending_in` and :func:`loops_in`."""
     return {
         "failure": ending.failure,
         "remark": ending.remark,
@@ -451,27 +440,20 @@ def content_of(header: Header, ending: Ending, loops: Sequence[Loop]) -> dict[st
 def write_content(
     folder: Path, content: Mapping[str, object], packages: Sequence[str] = RECORDED_PACKAGES
 ) -> None:
-    """Write a record, with versions, the platform, and the names of all files beside it."""
-    versions = {package: version(package) for package in packages}
-    copy_record(
-        folder,
-        {
-            **content,
-            "versions": {"python": platform.python_version()} | versions,
-            "platform": platform.platform(),
-        },
-    )
+    """Write a record, with versions, the platform, and the names of all files in its folder."""
+    versions = {"python": platform.python_version(), **{name: version(name) for name in packages}}
+    copy_record(folder, {**content, "versions": versions, "platform": platform.platform()})
 
 
 def copy_record(folder: Path, content: Mapping[str, object]) -> None:
-    """Write a record unchanged, except for the names of all files beside it."""
+    """Write a record unchanged, except for the names of all files in its folder."""
     files = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
     whole = {**content, "files": sorted(files | {RECORD})}
     (folder / RECORD).write_text(in_json(whole), encoding="utf-8")
 
 
 def in_json(content: Mapping[str, object]) -> str:
-    """A record or indices as JSON, with texts for numbers that are not finite."""
+    """Format a record or indices as JSON, with texts for numbers that are not finite."""
     return json.dumps(_as_texts(content), indent=2, allow_nan=False) + "\n"
 
 
@@ -485,7 +467,7 @@ def _as_texts(content: object) -> object:
 
 
 def _as_numbers(content: Any) -> Any:
-    """Replace these texts by numbers."""
+    """Replace texts for numbers that are not finite by these numbers."""
     if isinstance(content, dict):
         return {name: _as_numbers(value) for name, value in content.items()}
     if isinstance(content, list):
@@ -494,7 +476,7 @@ def _as_numbers(content: Any) -> Any:
 
 
 def ending_in(record: dict[str, Any]) -> Ending:
-    """The end of a run, from its record."""
+    """Read the end of a run from its record."""
     events = (
         Occurrence(float(e["time"]), str(e["text"]), str(e["label"]), int(e.get("event", 0)))
         for e in record.get("events", ())
@@ -508,7 +490,7 @@ def ending_in(record: dict[str, Any]) -> Ending:
 
 
 def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
-    """The header of a table, from the record beside it."""
+    """Read the header of a table from its record."""
     stated = record["experiment"]
     known = {field.name: stated[field.name] for field in fields(Experiment) if field.name in stated}
     types = _types_in(record)
@@ -526,7 +508,7 @@ def header_in(record: dict[str, Any], columns: tuple[str, ...]) -> Header:
 
 
 def _types_in(record: dict[str, Any]) -> dict[str, str]:
-    """The types of columns and parameters that hold anything but doubles."""
+    """Read the types of columns and parameters other than doubles."""
     # Earlier versions named columns of texts only.
     types = record.get("types", dict.fromkeys(record.get("texts", ()), "String"))
     if not Header.TYPES.issuperset(types.values()):
@@ -535,7 +517,7 @@ def _types_in(record: dict[str, Any]) -> dict[str, str]:
 
 
 def loops_in(record: dict[str, Any]) -> tuple[Loop, ...]:
-    """The loops of the vehicles of a run, from its record; the standard loop if it names none."""
+    """Read the loops of the vehicles of a run from its record; default: the standard loop."""
     return tuple(loop_of(names) for names in record.get("vehicles", ())) or (STANDARD,)
 
 
@@ -549,17 +531,15 @@ def read_result(
     """Read a stored result for drawing: only some columns, and no more rows than can be seen.
 
     Args:
-        path: a folder that a run has written, or a table in CSV or Parquet; without a record
-            beside it, the parameters are unknown.
+        path: a folder that a run has written, or a table in CSV or Parquet; without a record, the
+            parameters are unknown.
         watched: chooses among the columns, given the loops; None: those of the paper's figures.
 
     Raises:
         InputError: there is no result, or it cannot be read.
 
     """
-    file = table_in(path)
-    record = read_record(file)
-    header, blocks = stored_rows(file, record)
+    file, record, header, blocks = _stored(path)
     loops = loops_in(record)
     drawn = {name for loop in loops for name in loop.drawn()}
     table = VisibleRows(drawn if watched is None else watched(header.columns, loops))
@@ -571,25 +551,37 @@ def read_result(
     return Drawn(label, table, bool(record.get("z_up")), loops)
 
 
-def stored_rows(file: Path, record: dict[str, Any]) -> tuple[Header, Iterator[np.ndarray]]:
-    """The header and the rows of a stored table, block by block.
+def _stored(path: Path) -> tuple[Path, dict[str, Any], Header, Iterator[np.ndarray]]:
+    """Open a stored result, with a warning about files that were changed since the run.
+
+    Returns:
+        The file of its table, its record, its header, and its rows, block by block.
 
     Raises:
-        InputError: it cannot be read, or has no rows.
+        InputError: there is none, it cannot be read, or it has no rows.
 
     """
-    place = locate(file)
+    file = table_in(path)
+    for written in (file, file.with_name(RECORD)):
+        if locate(written).is_file() and is_changed(written):
+            warnings.warn(f"{written} was changed since the run wrote it", stacklevel=3)
+    record, place = read_record(file), locate(file)
     columns = read_columns(place)
     header = header_in(record, columns) if record else None
     blocks = read_rows(place, header.encoders if header else {})
     first = next(blocks, None)
     if first is None:
         raise InputError(f"{file}: has no rows")
-    return header or _header(columns, first, file), chain([first], blocks)
+    if header is None:
+        step = float(first[1, 0] - first[0, 0]) if len(first) > 1 else 1.0
+        if not 0.0 < step < inf:
+            raise InputError(f"{file}: times must increase")
+        header = Header(columns, Experiment(step, step))
+    return file, record, header, chain([first], blocks)
 
 
 def table_in(path: Path) -> Path:
-    """The file with the table of a result.
+    """Find the file with the table of a result.
 
     Raises:
         InputError: there is none.
@@ -603,20 +595,15 @@ def table_in(path: Path) -> Path:
 
 
 def companion_tables(table: Path) -> list[Path]:
-    """The tables of the runs that a result is compared with, in folders below its own."""
+    """Find the tables of the runs that a result is compared with, in folders below its own."""
     names = (Path(str(name)) for name in read_record(table).get("files", ()))
     below = (name for name in names if len(name.parts) == 2 and name.name in TABLES)
-    found = (table.parent / name for name in below if name.parent.name not in ("", ".."))
-    return [file for file in found if file.is_file() and not file.parent.is_symlink()]
-
-
-def changed_files(table: Path) -> list[Path]:
-    """The table of a result and its record, if they were changed since the run wrote them."""
-    return [file for file in (table, table.with_name(RECORD)) if is_changed(file)]
+    files = (table.parent / name for name in below if name.parent.name not in ("", ".."))
+    return [file for file in files if file.is_file() and not file.parent.is_symlink()]
 
 
 def read_record(table: Path) -> dict[str, Any]:
-    """The record of the run that wrote a table; empty if there is none that names the table.
+    """Read the record of the run that wrote a table; empty if there is none that names the table.
 
     Raises:
         InputError: it is broken.
@@ -639,11 +626,3 @@ def read_record(table: Path) -> dict[str, Any]:
             if not isinstance(value, float | int | str):
                 raise ValueError(f"the parameter {name} is {value!r}")
     return dict(record)
-
-
-def _header(columns: tuple[str, ...], rows: np.ndarray, file: Path) -> Header:
-    """The header of a table without a record, with the step of its first rows."""
-    step = float(rows[1, 0] - rows[0, 0]) if len(rows) > 1 else 1.0
-    if not 0.0 < step < inf:
-        raise InputError(f"{file}: times must increase")
-    return Header(columns, Experiment(step, step))

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import KW_ONLY, dataclass, field, fields, replace
+from dataclasses import replace
 from functools import partial
 from itertools import zip_longest
 from pathlib import Path
@@ -29,7 +29,7 @@ from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.disk import file_name, process_folder
-from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.errors import Findings, InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.texts import matches, matching
 from orchestrator.runs.folder import (
@@ -42,18 +42,20 @@ from orchestrator.runs.folder import (
     publish,
     replace_files,
 )
-from orchestrator.runs.loading import check_brings_its_own, load_scenario, notes_as_warnings
-from orchestrator.runs.preparation import Prepared, prepare
+from orchestrator.runs.preparation import (
+    Prepared,
+    check_brings_its_own,
+    load_scenario,
+    prepare,
+    warn_of,
+)
 from orchestrator.runs.progress import Progress
 from orchestrator.runs.request import (
-    CHECKPOINT_EVERY,
     Files,
-    Options,
-    Request,
-    option,
+    SimulateOptions,
     takes_keywords,
 )
-from orchestrator.runs.result import FILES, Result, Stopwatch, write_metrics, write_record
+from orchestrator.runs.result import FILES, Result, Stopwatch, write_record
 from orchestrator.runs.scenario import Scenario
 from orchestrator.vehicle.cautions import Watch, cautions, cautions_beside, values_of
 from orchestrator.vehicle.indices import Metrics
@@ -63,49 +65,18 @@ from orchestrator.vehicle.signals import suffixes
 #: The folder of checkpoints, within the folder of the result.
 CHECKPOINTS = "checkpoint"
 
-#: A file that keeps room for the files written last, so that a full disk does not cost the record.
+#: A file that reserves room for the files written last, so that a full disk does not cost the
+#: record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
 
 #: The caller of :func:`simulate`, seen from where it warns: the decorator adds a level.
-_STACK_LEVEL = 5
+_STACK_LEVEL = 4
 
 #: Exit status of a process that a run has to end.
 _FAILED = 1
 
 
 # Runs in memory
-
-
-@dataclass(frozen=True)
-class SimulateOptions(Options):
-    """Arguments of :func:`simulate`."""
-
-    system: str | Path | Mapping[str, Any] | System = field(
-        metadata={
-            "help": "name of a scenario, path of a file such as .toml or .ssp, a dictionary with "
-            "the entries of a scenario file, or a system from `load`"
-        }
-    )
-    parameters: Mapping[str, object] | None = option(
-        None,
-        "values in place of the scenario's, by `component.parameter`: numbers, Booleans, names, or "
-        "text as on the command line; for a group, such as `plant.eta0`, a list with a value for "
-        "each member",
-    )
-    _: KW_ONLY
-    progress: bool = option(False, "show a bar on runs that take longer than some seconds")
-    variant: str | None = option(None, "name of a system description in an SSP")
-    checkpoint: str | Path | None = option(
-        None,
-        "folder for checkpoints, from which another process can continue the run; it is removed "
-        "when the run is complete",
-    )
-    checkpoint_every: float | None = option(None, CHECKPOINT_EVERY)
-    resume: bool = option(
-        False,
-        "continue from the last checkpoint. The result has all rows, as if the run had not been "
-        "interrupted; its `resumed_at` has the time at which it continued",
-    )
 
 
 @takes_keywords(SimulateOptions)
@@ -127,29 +98,23 @@ def simulate(options: SimulateOptions) -> Result:
         KeyboardInterrupt: Ctrl-C, after the current step.
 
     """
-    system, strict = options.system, options.strict
+    system, findings = options.system, Findings(options.strict)
     if isinstance(system, System):
         check_brings_its_own(str(system), options.kind)
         if options.variant is not None:
             raise InputError(f"{system}: has no variants; give it to load")
         scenario = Scenario(system.name)
     else:
-        with notes_as_warnings(strict, _STACK_LEVEL) as findings:
-            scenario, system = load_scenario(
-                system, options.kind, variant=options.variant, findings=findings
-            )
-            findings.refuse()
-    parameters = {} if options.parameters is None else options.parameters
-    if not isinstance(parameters, Mapping):
-        raise InputError(f"parameters: a mapping by component.parameter, not {parameters!r}")
-    changes = {one.name: getattr(options, one.name) for one in fields(Options)}
-    changes["steps"] = options.steps or {}
-    prepared = prepare(scenario, system, Request("", parameters, **changes))
-    if options.system is not system:
-        with notes_as_warnings(strict, _STACK_LEVEL) as findings:
-            for doubt in prepared.doubts():
-                findings.note(doubt)
-            findings.refuse()
+        scenario, system = load_scenario(
+            system, options.kind, variant=options.variant, findings=findings
+        )
+        findings.refuse()
+    if not isinstance(options.parameters, Mapping | None):
+        raise InputError(
+            f"parameters: a mapping by component.parameter, not {options.parameters!r}"
+        )
+    prepared = prepare(scenario, system, options)
+    warn_of(findings, [] if options.system is system else prepared.doubts(), _STACK_LEVEL)
     result = Result(scenario, prepared.loops, prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * options.progress)]
     with _checkpoints_for(prepared, options) as kept:
@@ -166,7 +131,7 @@ def simulate(options: SimulateOptions) -> Result:
 def _checkpoints_for(
     prepared: Prepared, options: SimulateOptions
 ) -> Iterator[Sequence[Checkpoints]]:
-    """The checkpoints of a run, in a folder kept from other runs; none, if none are wanted."""
+    """Provide the checkpoints that the options ask for, in a folder locked against other runs."""
     folder, every, resume = options.checkpoint, options.checkpoint_every, options.resume
     if folder is None and every is None and not resume:
         yield ()
@@ -185,10 +150,12 @@ def _checkpoints_for(
 
 
 class WrittenRun:
-    """A run whose rows go into files, with what is known of it once it has ended.
+    """A run whose rows are written into files.
 
     Attributes:
+        name: of its scenario.
         prepared: the run.
+        folder: of its files, until they are published.
         ending: how it has ended.
         metrics: content of metrics.json.
 
@@ -202,28 +169,27 @@ class WrittenRun:
         columns: Sequence[str] | None,
         checkpoints: Checkpoints | None,
     ) -> None:
-        """Open its files.
+        """Open the files in a folder.
 
         Args:
-            folder: of its files, for now.
+            folder: of the files.
             prepared: the run.
-            files: the files to write.
+            files: options of the files.
             columns: of its table; None: all.
-            checkpoints: that it writes and continues from; None: there are none.
+            checkpoints: to write and to continue from; None: there are none.
 
         """
-        self.folder, self.prepared = folder, prepared
-        self.ending, self.metrics = Ending(), dict[str, Any]()
-        self.name, loops = prepared.scenario.name, prepared.loops
+        self.folder, self.prepared, loops = folder, prepared, prepared.loops
+        self.name, self.ending, self.metrics = prepared.scenario.name, Ending(), dict[str, Any]()
         # Without figures only references are compared.
         self.seen = VisibleRows(
-            {name for one in loops for name in (one.y_d if files.no_figures else one.drawn())}
+            {name for loop in loops for name in (loop.y_d if files.no_figures else loop.drawn())}
         )
-        self.watch, self._metrics = Watch(loops), Metrics(loops)
+        self._watch, self._metrics = Watch(loops), Metrics(loops)
         self._table = TableFile.at(folder / f"result.{files.format}")
         self._real_time = None if files.real_time is None else RealTime(files.real_time)
         self._resumed_at = checkpoints and checkpoints.time
-        self._hooks: list[Hook] = [one for one in (checkpoints, self._real_time) if one]
+        self._hooks: list[Hook] = [hook for hook in (checkpoints, self._real_time) if hook]
         self._observers: list[Observer] = [
             Selection(self._table, files.interval, columns),
             *(
@@ -231,7 +197,7 @@ class WrittenRun:
                 for loop, vehicle in suffixes(loops).items()
             ),
             self._metrics,
-            self.watch,
+            self._watch,
             self.seen,
             Progress(self.name),
             *([checkpoints] if checkpoints else []),
@@ -248,16 +214,30 @@ class WrittenRun:
         self._table.end(self.ending)
         self.metrics = {"scenario": self.name, "failure": self.ending.failure}
 
+    def warnings(self, first: WrittenRun) -> Iterator[str]:
+        """Warn of its events and rows; `first` is the run that it is compared with."""
+        if not self.ending.failure:
+            yield from (f"did not happen: {event}" for event in self.prepared.missed(self.ending))
+        yield from cautions_beside(self.seen, first.name, first.seen, first.prepared.loops)
+        yield from (caution.text for caution in self._watch.found())
+
     def write_ends(self, command: Sequence[str], clock: Stopwatch) -> None:
-        """Write metrics.json, and the record of all files beside and below it."""
+        """Write metrics.json, and the record of all files in its folder."""
         remarks: dict[str, object] = {}
         if self._real_time is not None:
             remarks["real_time"] = self._real_time.record()
         if self._resumed_at is not None:
             remarks["resumed_at"] = self._resumed_at
-        write_metrics(self.folder, self.metrics)
-        header = self.seen.whole_header
-        write_record(self.folder, self.prepared, header, self.ending, command, clock, remarks)
+        write_record(
+            self.folder,
+            self.prepared,
+            self.seen.whole_header,
+            self.ending,
+            self.metrics,
+            command,
+            clock,
+            remarks,
+        )
 
     @property
     def notes(self) -> list[str]:
@@ -273,14 +253,14 @@ def run_into(
     say: Callable[[str], None],
     draw: Callable[..., list[str]] | None,
 ) -> tuple[Path, list[WrittenRun]]:
-    """Run a scenario, and those it is compared with, and write the files of all.
+    """Run a scenario and the one that it is compared with, and write the files of both.
 
     Args:
-        folder: for the files of the first; the others go into folders below it.
-        runs: the scenario, and those it is compared with.
+        folder: of the files of the first; the others go into folders below it.
+        runs: the scenario, and the compared one, if there is one.
         files: the files to write.
         command: for the record.
-        say: takes notes for the user while it goes on.
+        say: takes notes for the user during the run.
         draw: the figures, :func:`.drawing.draw`; None: there are none.
 
     Returns:
@@ -302,7 +282,7 @@ def run_into(
     done: list[WrittenRun] = []
     with (
         held_interrupts() as interrupts,
-        replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as path,
+        replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as staging,
     ):
         kept = checkpoints_of(
             runs,
@@ -313,150 +293,110 @@ def run_into(
             Ledger(folder).token,
             say,
         )
-        output = _Output(path, folder, done, command, say)
+        clock, spare = Stopwatch(), staging / _SPARE
+        # No zeros: some file systems need no room for them.
+        spare.write_bytes(os.urandom(_SPARE_BYTES))
+
+        def give_up(run: WrittenRun) -> None:
+            """Keep the rows so far and end the process: the thread of the FMUs never will."""
+            try:
+                spare.unlink()
+                run.give_up()
+                _write_ends([*done, run], command, clock)
+                place = publish(Ledger(folder))
+                say(f"{run.name} {run.ending.failure}; its rows are in {place}")
+                rmtree(process_folder(), ignore_errors=True)
+            except Exception as error:
+                say(f"ended: an FMU did not return; its rows are in {staging}: {reason(error)}")
+            finally:
+                os._exit(_FAILED)
+
+        latest = staging
         try:
             for prepared, name, columns, checkpoints in zip_longest(runs, below, tables, kept):
-                step, loops = prepared.experiment.step, prepared.loops
-                before = cautions(values_of(prepared.system), step, loops)
-                output.warn(prepared, (caution.text for caution in before))
-                output.latest = path / name
-                output.latest.mkdir(exist_ok=True)
-                output.make(
-                    WrittenRun(output.latest, prepared, files, columns, checkpoints), interrupts
-                )
+                for caution in cautions(
+                    values_of(prepared.system), prepared.experiment.step, prepared.loops
+                ):
+                    say(f"warning: {prepared.scenario.name}: {caution.text}")
+                latest = staging / name
+                latest.mkdir(exist_ok=True)
+                run = WrittenRun(latest, prepared, files, columns, checkpoints)
+                with interrupts.insistence(partial(give_up, run)):
+                    run.make()
+                done.append(run)
+                for text in run.warnings(done[0]):
+                    say(f"warning: {run.name}: {text}")
                 if interrupts:
                     break
             if draw is not None:
-                output.draw(draw, interrupts)
+                _draw(draw, done, staging, interrupts, say)
         except (OSError, MemoryError) as error:
-            output.rescue(error)
-        place = output.finish()
-    is_whole = len(done) == len(runs) and all(run.ending.failure is None for run in done)
-    leave_checkpoints(kept, is_whole, say)
+            # The runs that are done are written without the other, or without figures.
+            if not done:
+                raise
+            if latest != done[-1].folder and latest.is_dir():
+                rmtree(latest)
+            failure = done[0].ending.failure or f"could not be written in full: {reason(error)}"
+            done[0].ending = replace(done[0].ending, failure=failure)
+        if not staging.is_dir():
+            raise InputError(
+                f"{folder} was moved or deleted while it was written, along with the results in "
+                f"{staging.name}"
+            )
+        spare.unlink()
+        _write_ends(done, command, clock)
+        place = place_of(Ledger(folder))
+    # The second run is missing after an interrupt.
+    leave_checkpoints(kept, [run.ending.failure for run in done] == [None] * len(runs), say)
     return place, done
 
 
-class _Output:
-    """The folder that runs are written into, before its files take their places.
+def _write_ends(runs: Sequence[WrittenRun], command: Sequence[str], clock: Stopwatch) -> None:
+    """Write the records of runs: the one of the first, which names all files, comes last."""
+    for run in reversed(runs):
+        run.write_ends(command, clock)
 
-    A step that never returns or a full disk costs what is not written yet, not what is.
-    """
 
-    def __init__(
-        self,
-        path: Path,
-        folder: Path,
-        done: list[WrittenRun],
-        command: Sequence[str],
-        say: Callable[[str], None],
-    ) -> None:
-        """Take the path that the folder has for now, and keep room there for the record."""
-        self._path, self._folder, self._done = path, folder, done
-        self._command, self._clock, self._say = command, Stopwatch(), say
-        #: The folder of the latest run.
-        self.latest = path
-        self._spare = path / _SPARE
-        # No zeros: some file systems need no room for them.
-        self._spare.write_bytes(os.urandom(_SPARE_BYTES))
-
-    def warn(self, prepared: Prepared, texts: Iterable[str]) -> None:
-        """Pass on warnings about a run."""
-        for text in texts:
-            self._say(f"warning: {prepared.scenario.name}: {text}")
-
-    def make(self, run: WrittenRun, interrupts: Interrupts) -> None:
-        """Make a run, and warn of what it shows, also beside the first."""
-        with interrupts.insistence(partial(self._give_up, run)):
-            run.make()
-        self._done.append(run)
-        first, prepared = self._done[0], run.prepared
-        missed = [] if run.ending.failure else prepared.missed(run.ending)
-        self.warn(prepared, (f"did not happen: {event}" for event in missed))
-        loops = first.prepared.loops
-        self.warn(prepared, cautions_beside(run.seen, first.name, first.seen, loops))
-        self.warn(prepared, (caution.text for caution in run.watch.found()))
-
-    def draw(self, draw: Callable[..., list[str]], interrupts: Interrupts) -> None:
-        """Draw all figures or, where one of them cannot be written, none."""
-        first = self._done[0]
-        ended_at_once = first.ending.failure is not None and len(first.seen.rows) == 1
-        if interrupts.urgent or ended_at_once:
-            return
-        scenario = first.prepared.scenario
-        drawn = [
-            Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.loops)
-            for run in self._done
-        ]
-        try:
-            notes = draw(
-                scenario.figure,
-                scenario.title,
-                drawn,
-                self._path,
-                scenario.stem,
-                stop=lambda: interrupts.urgent,
-            )
-        except BaseException:
-            for name in _figures(first.prepared):
-                (self._path / name).unlink(missing_ok=True)
-            raise
-        for note in notes:
-            self._say(note)
-
-    def rescue(self, error: OSError | MemoryError) -> None:
-        """Go on with the runs that are done, where another or the figures cannot be written."""
-        if not self._done:
-            raise error
-        if self.latest != self._done[-1].folder and self.latest.is_dir():
-            rmtree(self.latest)
-        first, failure = self._done[0], f"could not be written in full: {reason(error)}"
-        first.ending = replace(first.ending, failure=first.ending.failure or failure)
-
-    def finish(self) -> Path:
-        """Write what is written last, and return the folder that all files will be in.
-
-        Raises:
-            InputError: the folder is gone.
-
-        """
-        if not self._path.is_dir():
-            raise InputError(
-                f"{self._folder} was moved or deleted while it was written, along "
-                f"with the results in {self._path.name}"
-            )
-        self._spare.unlink()
-        self._write_ends(self._done)
-        return place_of(Ledger(self._folder))
-
-    def _give_up(self, run: WrittenRun) -> None:
-        """Keep what is there and end the process; the thread that steps the FMUs never will."""
-        try:
-            self._spare.unlink()
-            run.give_up()
-            self._write_ends([*self._done, run])
-            place = publish(Ledger(self._folder))
-            self._say(f"{run.name} {run.ending.failure}; its rows are in {place}")
-            rmtree(process_folder(), ignore_errors=True)
-        except Exception as error:
-            self._say(
-                f"ended: an FMU did not return; its rows are in {self._path}: {reason(error)}"
-            )
-        finally:
-            os._exit(_FAILED)
-
-    def _write_ends(self, done: Sequence[WrittenRun]) -> None:
-        # The record of the first names the files of all.
-        for run in reversed(done):
-            run.write_ends(self._command, self._clock)
+def _draw(
+    draw: Callable[..., list[str]],
+    done: Sequence[WrittenRun],
+    folder: Path,
+    interrupts: Interrupts,
+    say: Callable[[str], None],
+) -> None:
+    """Draw all figures or, if one of them cannot be written, none."""
+    first, scenario = done[0], done[0].prepared.scenario
+    ended_at_once = first.ending.failure is not None and len(first.seen.rows) == 1
+    if interrupts.urgent or ended_at_once:
+        return
+    drawn = [
+        Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.loops)
+        for run in done
+    ]
+    try:
+        notes = draw(
+            scenario.figure,
+            scenario.title,
+            drawn,
+            folder,
+            scenario.stem,
+            stop=lambda: interrupts.urgent,
+        )
+    except BaseException:
+        for name in _figures(first.prepared):
+            (folder / name).unlink(missing_ok=True)
+        raise
+    for note in notes:
+        say(note)
 
 
 def _figures(prepared: Prepared) -> list[str]:
-    """The files of the figures of a scenario."""
+    """Files of the figures of a scenario."""
     return figure_files(prepared.scenario.figure, prepared.scenario.stem, prepared.loops)
 
 
 def _places(runs: Sequence[Prepared]) -> tuple[list[str], list[str]]:
-    """The folder of each run within that of the first, and all files as far as they are known."""
+    """Name the folder of each run below the first, and all files that are known before."""
     files = _figures(runs[0])
     taken = [*FILES, _certificates(""), *files, CHECKPOINTS, INCOMPLETE, LEDGER]
     below = ["", *(file_name(prepared.scenario.name, taken) for prepared in runs[1:])]
@@ -467,17 +407,20 @@ def _places(runs: Sequence[Prepared]) -> tuple[list[str], list[str]]:
 
 
 def _certificates(vehicle: str) -> str:
-    """The file of the certificates of a loop, by the suffix that names its vehicle."""
+    """File of the certificates of a loop, by the suffix that names its vehicle."""
     return f"certificates{vehicle}.csv"
 
 
 def selected_columns(system: System, wanted: str, is_companion: bool = False) -> list[str] | None:
-    """The columns of a table; None: all.
+    """Choose the columns of a table by `all`, `outputs`, or patterns with commas between them.
 
     Args:
         system: the system of the run.
-        wanted: `all`, `outputs`, or patterns with commas between them.
-        is_companion: whether patterns may match nothing, as they may be for another run.
+        wanted: the choice.
+        is_companion: True if patterns may match nothing, because another run has the columns.
+
+    Returns:
+        Their names; None: all.
 
     Raises:
         InputError: a pattern matches no column.
@@ -518,19 +461,19 @@ def checkpoints_of(
     token: str = "",
     say: Callable[[str], None] = lambda _: None,
 ) -> list[Checkpoints]:
-    """The checkpoints of some runs, made one after the other.
+    """Begin or resume the checkpoints of runs that are made one after the other.
 
     Args:
         runs: the runs.
         folders: of their checkpoints.
-        every: time between two checkpoints [simulated s]; None: as before, if runs are resumed.
+        every: time between two checkpoints [simulated s]; None: that of the resumed runs.
         resume: begin with the checkpoints that are there.
         force: move aside other files that are there.
         token: random, for new checkpoints; empty: one is drawn.
         say: takes notes for the user.
 
     Returns:
-        Those of each run; an empty list if none are wanted.
+        Checkpoints of each run; an empty list if none are wanted.
 
     Raises:
         InputError: there is nothing to resume, or an FMU does not provide its state.
@@ -562,12 +505,7 @@ def checkpoints_of(
 
 
 def check_gives_states(system: System) -> None:
-    """Check that all FMUs provide their state.
-
-    Raises:
-        InputError: one does not.
-
-    """
+    """Check that all FMUs provide their state; an InputError names one that does not."""
     for name, component in system.components.items():
         if not component.gives_state:
             raise InputError(
@@ -579,25 +517,13 @@ def check_gives_states(system: System) -> None:
 def leave_checkpoints(
     kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
 ) -> None:
-    """Remove checkpoints of complete runs, or say where they are.
-
-    Args:
-        kept: of runs that belong together.
-        is_whole: whether all of them are complete.
-        say: takes notes for the user.
-
-    """
-    # The folder of the first holds those of the others.
+    """Remove the checkpoints of runs that belong together if all are complete, else name them."""
+    # The first folder contains the others.
     for checkpoints in reversed(kept):
         if is_whole:
             checkpoints.remove()
         elif checkpoints.time is not None:
-            place = _shown(checkpoints.folder)
+            place = checkpoints.folder
+            with suppress(OSError, ValueError):
+                place = place.relative_to(Path.cwd())
             say(f"--resume continues from t = {checkpoints.time:g} s, from {place}")
-
-
-def _shown(folder: Path) -> Path:
-    """A folder, relative to the current one if it is in it."""
-    with suppress(OSError, ValueError):
-        return folder.relative_to(Path.cwd())
-    return folder

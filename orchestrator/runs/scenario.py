@@ -1,7 +1,7 @@
 """Scenarios: changes to the closed loop in a TOML file, its tables of inputs and waypoints, events.
 
-:mod:`.scenario_file` declares the entries of the file; it is imported only where a file is read,
-since pydantic takes a tenth of a second.
+:mod:`.scenario_file` declares the entries of the file. It is imported only to read one, because
+pydantic takes a tenth of a second.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import hashlib
 import re
 import tomllib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from math import isfinite
@@ -52,63 +52,54 @@ from orchestrator.runs import SCENARIOS_FOLDER, find_toml, names_in
 from orchestrator.runs.tables import read_columns, read_rows, records
 from orchestrator.vehicle.signals import ACTUATORS, STANDARD
 
-#: Messages about a file that cannot be read.
+#: Messages for files that cannot be read.
 _NOT_A_SCENARIO, _NO_INPUTS = "not a scenario", "not a table of inputs"
 
-#: The name of a scenario that has no file.
+#: Name of a scenario without a file.
 _NAMELESS = "scenario"
 
-#: Systems that are run besides the scenarios of the bundle.
+#: Files that can be run instead of the bundle's scenarios.
 _OTHERS = "a .toml, .ssp, .ssd or .fmu file, an OspSystemStructure.xml, or a folder with a .ssd"
 
-#: The largest difference of times, so that it can be computed [s].
+#: Largest difference of times, so that it can be computed [s].
 _FARTHEST = 1e308
-
-#: The model of the planners that run through waypoints.
-_PATH_PLANNER = "PathPlanner"
 
 #: Stands for the name of each vehicle, `auv1`, `auv2`, ...; in a wire, for the same vehicle.
 EACH_VEHICLE = "auv*"
 
-#: The columns of a table of waypoints, without times and with them.
+#: Columns of a table of waypoints, without times and with them.
 _PLACE, _TIMED = ["x", "y", "z"], ["t", "x", "y", "z"]
 
 _CONDITION = re.compile(rf"(\S+)\s*({'|'.join(Condition.COMPARISONS)})\s*(\S+)")
 
 
-def vehicle_names(n: int | None) -> list[str]:
-    """Names of n vehicles; None: the components of a single one have no prefix."""
-    if n is None:
-        return []
-    return [EACH_VEHICLE.replace("*", str(number)) for number in range(1, n + 1)]
+def for_each_vehicle(n: int | None, table: Mapping[str, Any]) -> dict[str, Any]:
+    """Replace each entry for `auv*` by one for each of n vehicles; entries for one vehicle win.
 
-
-def for_each(star: str, names: Sequence[str], table: Mapping[str, Any]) -> dict[str, Any]:
-    """Replace each entry of a table that has a star by one for each name; other entries win.
-
-    Args:
-        star: stands for a name, in keys, and in texts that are their values.
-        names: the names; without any, entries stay as they are.
-        table: by texts that may have the star.
-
+    A text that is the value of an entry is for the same vehicle as its key. None: entries stay as
+    they are.
     """
+    if n is None:
+        return dict(table)
     replaced = {
-        key.replace(star, name): value.replace(star, name) if isinstance(value, str) else value
-        for name in names
+        key.replace(EACH_VEHICLE, name): (
+            value.replace(EACH_VEHICLE, name) if isinstance(value, str) else value
+        )
+        for name in (EACH_VEHICLE.replace("*", str(number)) for number in range(1, n + 1))
         for key, value in table.items()
-        if star in key
+        if EACH_VEHICLE in key
     }
-    return replaced | {key: value for key, value in table.items() if star not in key or not names}
+    return replaced | {key: value for key, value in table.items() if EACH_VEHICLE not in key}
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """A table of inputs, as a scenario or the command line names it.
+    """A table of inputs of a scenario or of the command line.
 
     Attributes:
-        file: with the table.
+        file: the table.
         between: interpolation of continuous Real inputs between two rows, `linear` or `hold`.
-        wins: over the parameters of the scenario, like a table of the command line.
+        wins: True for a table of the command line, which wins over parameters of the scenario.
 
     """
 
@@ -119,7 +110,7 @@ class Inputs:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """The names of its columns, after the time.
+        """Names of its columns, after the time.
 
         Raises:
             InputError: the table cannot be read.
@@ -128,12 +119,12 @@ class Inputs:
         return read_columns(self.file, _NO_INPUTS)
 
     def columns(self, variables: Sequence[Variable]) -> list[np.ndarray]:
-        """The times, and the columns in the types of their variables.
+        """Return the times, and the columns in the types of their variables.
 
-        Systems whose variables are alike share what was read.
+        They are read once for systems whose variables are alike.
 
         Raises:
-            InputError: the table cannot be read, or holds a value of another type.
+            InputError: the table cannot be read, or a value has another type.
 
         """
         kinds = tuple((v.type, v.min, v.max, *v.items.items()) for v in variables)
@@ -157,12 +148,7 @@ class Inputs:
 
 
 def _number(name: str, variable: Variable, encode: Callable[[Any], float], value: object) -> float:
-    """Return what a row has for a cell of a table.
-
-    Raises:
-        ValueError: the variable cannot have this value.
-
-    """
+    """Return the number in a row for a cell of a table; a ValueError names a wrong value."""
     try:
         return encode(variable.typed(variable.cell(value, f"{name}:"), name))
     except InputError as error:
@@ -171,7 +157,7 @@ def _number(name: str, variable: Variable, encode: Callable[[Any], float], value
 
 @dataclass(frozen=True)
 class Difference:
-    """The entries of `[compare]`: how a second run differs from its scenario."""
+    """Entries of `[compare]`: what differs in the second run of a scenario."""
 
     name: str
     label: str = ""
@@ -186,7 +172,7 @@ class Scenario:
 
     Attributes:
         name: of the file, without its ending.
-        digest: SHA-256 of the file; empty for a system that has none.
+        digest: SHA-256 of the file; empty for a system without one.
 
     """
 
@@ -219,17 +205,17 @@ class Scenario:
 
     @property
     def legend(self) -> str:
-        """Name of its lines where two runs are drawn together."""
+        """Name of its lines in a comparison of two runs."""
         return self.label or self.name
 
 
 def names() -> list[str]:
-    """Scenarios that come with the bundle."""
+    """Return the names of the scenarios of the bundle."""
     return names_in(SCENARIOS_FOLDER)
 
 
 def read_scenario(name: str) -> Scenario:
-    """A scenario of the bundle by its name, or any by the path of its file.
+    """Read a scenario of the bundle by its name, or any by the path of its file.
 
     Raises:
         InputError: there is no such scenario, or its file has a mistake.
@@ -242,7 +228,7 @@ def read_scenario(name: str) -> Scenario:
 
 
 def scenario_of(content: Mapping[str, Any]) -> Scenario:
-    """A scenario from the content of a file; paths in it are relative to the current folder.
+    """Read a scenario from the content of a file; paths in it are relative to the current folder.
 
     Raises:
         InputError: there is a mistake in it.
@@ -252,12 +238,7 @@ def scenario_of(content: Mapping[str, Any]) -> Scenario:
 
 
 def check_events(where: object, tables: Sequence[Mapping[str, Any]]) -> None:
-    """Check events as far as is possible without a system.
-
-    Raises:
-        Refused: one of them is no event.
-
-    """
+    """Check tables of events without a system; Refused names all mistakes."""
     from orchestrator.runs.scenario_file import ScenarioFile  # noqa: PLC0415
 
     ScenarioFile.check(where, {"events": list(tables)})
@@ -273,7 +254,7 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
             'wires."controller.dy" = "plant.dy" }'
         )
     ScenarioFile.check(path, content)
-    vehicles = vehicle_names(content.get("vehicles"))
+    vehicles = content.get("vehicles")
     _read_system(content, path.parent, vehicles)
     if "compare" in content:
         _read_system(content["compare"], path.parent, vehicles)
@@ -281,7 +262,7 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
     for key in content.keys() & {"order", "only"}:
         if isinstance(content[key], list):
             listed = dict.fromkeys(content[key])
-            content[key] = [*for_each(EACH_VEHICLE, vehicles, listed)]
+            content[key] = [*for_each_vehicle(vehicles, listed)]
     if "path" in content:
         waypoints = content.pop("path")
         component = waypoints.get("component", STANDARD.planner)
@@ -296,14 +277,14 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
 
-def _read_system(content: dict[str, Any], folder: Path, vehicles: Sequence[str]) -> None:
-    """Replace the entries about the system by what they mean, for each vehicle."""
+def _read_system(content: dict[str, Any], folder: Path, vehicles: int | None) -> None:
+    """Resolve names, paths and stars in the entries about the system."""
     content["parameters"] = {
         PortName.read(key): value
         for key, value in flatten(content.get("parameters", {}), System.is_spread)
     }
     for key in content.keys() & {"components", "wires", "steps"}:
-        content[key] = for_each(EACH_VEHICLE, vehicles, content[key])
+        content[key] = for_each_vehicle(vehicles, content[key])
     content["components"] = {
         component: str(folder / fmu) if str(fmu).endswith(".fmu") else fmu
         for component, fmu in content.get("components", {}).items()
@@ -313,12 +294,7 @@ def _read_system(content: dict[str, Any], folder: Path, vehicles: Sequence[str])
 def read_inputs(
     inputs: Inputs, system: System, given: Collection[PortName]
 ) -> tuple[System, InputTable]:
-    """A system that begins with the first values of a table, and the values that follow.
-
-    Args:
-        inputs: the table.
-        system: with the inputs.
-        given: ports with other values from the same file or command, which the table must not name.
+    """Read a table of inputs for :func:`with_input_table`.
 
     Raises:
         InputError: the table cannot be read, or a column is not an available input.
@@ -327,10 +303,14 @@ def read_inputs(
     columns = inputs.names
     with _in_file(inputs.file):
         targets = [system.named(PortName.read(name)) for name in columns]
-        variables = [system.component(one.component).variable(one.port) for one in targets]
+        variables = [_variable(system, target) for target in targets]
     times, *values = inputs.columns(variables)
     with _in_file(inputs.file):
         return with_input_table(system, targets, times, values, given, inputs.between)
+
+
+def _variable(system: System, port: PortName) -> Variable:
+    return system.component(port.component).variable(port.port)
 
 
 @contextmanager
@@ -349,33 +329,40 @@ def with_input_table(
     given: Collection[PortName] = (),
     between: str = "linear",
 ) -> tuple[System, InputTable]:
-    """A system that begins with the first values of inputs over time, and the values that follow.
+    """Start a system with the first values of inputs over time, and make the table of all.
 
     Args:
         system: with the inputs.
-        names: of the inputs.
-        times: of their values [s].
-        columns: their values, of each input in its type or as doubles.
-        given: ports that have values already.
+        names, times, columns: of the inputs; columns have the types of the inputs, or doubles.
+        given: ports whose values come from the same file or command; the table must not name them.
         between: interpolation of continuous Real inputs between two rows.
 
     Raises:
-        InputError: a column is not an available input, or cannot be followed.
+        InputError: a column is not an available input, or has values that it cannot take.
 
     """
     targets = tuple(map(system.named, names))
+    variables = [_variable(system, target) for target in targets]
     _check_rows(times, columns, targets)
-    for target, column in zip(targets, columns, strict=True):
+    fed = {connection.target: connection.source for connection in system.connections}
+    for target, variable, column in zip(targets, variables, columns, strict=True):
         if target in map(system.named, given):
             raise InputError(f"{target} is given both a value and a column of the table")
-        _check_column(system, target, column)
-    linear = [_is_linear(system, target, between) for target in targets]
+        if variable.causality != "input":
+            raise InputError(f"{target} has causality {variable.causality}, not input")
+        if target in fed:
+            raise InputError(f"{target} is fed by {fed[target]} and cannot be set")
+        is_real = variable.family == "Real"
+        values = np.array([column.min(), column.max()]) if is_real else np.unique(column)
+        for value in values.tolist():
+            _typed(variable, target, value)
+    # In FMI, discrete variables change only at events.
+    steady = ("Real", "continuous", "linear")
+    linear = [(v.family, v.variability, between) == steady for v in variables]
     input_table = InputTable.of(targets, times, columns, linear)
     start = system.start_time or 0.0
-    values = input_table.at(start, int((times <= start).sum()) - 1)
-    first = {
-        target: _typed(system, target, value) for target, value in zip(targets, values, strict=True)
-    }
+    row = input_table.at(start, int((times <= start).sum()) - 1)
+    first = dict(zip(targets, map(_typed, variables, targets, row), strict=True))
     return replace(system, parameters={**system.parameters, **first}), input_table
 
 
@@ -395,45 +382,20 @@ def _check_rows(
         raise InputError(f"times must be less than {_FARTHEST:g} s apart")
 
 
-def _check_column(system: System, target: PortName, column: np.ndarray) -> None:
-    """Check that an input can be supplied, and takes all values of its column."""
-    variable = system.component(target.component).variable(target.port)
-    if variable.causality != "input":
-        raise InputError(f"{target} has causality {variable.causality}, not input")
-    for connection in system.connections:
-        if connection.target == target:
-            raise InputError(f"{target} is fed by {connection.source} and cannot be set")
-    is_real = variable.family == "Real"
-    values = np.array([column.min(), column.max()]) if is_real else np.unique(column)
-    for value in values.tolist():
-        _typed(system, target, value)
-
-
-def _typed(system: System, target: PortName, value: Value) -> Value:
+def _typed(variable: Variable, port: PortName, value: Value) -> Value:
     """Convert a value of a table to the type of an input; integers may be whole doubles."""
-    variable = system.component(target.component).variable(target.port)
-    return variable.typed(f"{value:.17g}" if isinstance(value, float) else value, str(target))
-
-
-def _is_linear(system: System, target: PortName, between: str) -> bool:
-    variable = system.component(target.component).variable(target.port)
-    # In FMI, discrete variables change only at events.
-    return (variable.family, variable.variability, between) == ("Real", "continuous", "linear")
+    return variable.typed(f"{value:.17g}" if isinstance(value, float) else value, str(port))
 
 
 def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
-    """Parameters with which a planner runs through the waypoints of a table.
-
-    Args:
-        path: CSV with a line of names, x, y, z and maybe t, and a line for each waypoint.
-        component: the planner.
+    """Read a table of waypoints, x, y, z and possibly t, as the parameters of a planner.
 
     Raises:
         InputError: there is no such table, or it has a mistake.
 
     """
     with records(path, "not a table of waypoints", _are_of_waypoints) as (first, rows):
-        names = [*map(_plain, first)]
+        names = [name.strip().lower() for name in first]
         if not _are_of_waypoints(first):
             raise ValueError(f"its columns are {', '.join(names)}; use x, y, z or t, x, y, z")
         waypoints = [
@@ -451,10 +413,14 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
     return {PortName(component, port): value for port, value in values.items()}
 
 
+def _are_of_waypoints(names: Sequence[str]) -> bool:
+    return sorted(name.strip().lower() for name in names) in (_PLACE, _TIMED)
+
+
 def impossible_paths(system: System) -> Iterator[str]:
     """Find paths that PathPlanners of a system will refuse, without running them."""
     for name, component in system.components.items():
-        if component.description.modelName != _PATH_PLANNER:
+        if component.description.modelName != "PathPlanner":
             continue
         try:
             path_planner.check(_planned({**component.starts, **system.parameters_of(name)}))
@@ -466,7 +432,7 @@ def impossible_paths(system: System) -> Iterator[str]:
 
 
 def _planned(values: Mapping[str, Any]) -> Parameters:
-    """Parameters of the equations, from the values of ports."""
+    """Convert the values of a PathPlanner to the parameters of its equations."""
     x, y, z, t = (
         tuple(values[f"waypoint[{k}].{axis}"] for k in range(1, 1 + MOST)) for axis in "xyzt"
     )
@@ -482,14 +448,6 @@ def _planned(values: Mapping[str, Any]) -> Parameters:
     )
 
 
-def _plain(name: str) -> str:
-    return name.strip().lower()
-
-
-def _are_of_waypoints(names: Sequence[str]) -> bool:
-    return sorted(map(_plain, names)) in (_PLACE, _TIMED)
-
-
 # Events
 
 
@@ -499,13 +457,13 @@ def read_events(
     system: System,
     followed: Collection[PortName] = (),
 ) -> tuple[Event, ...]:
-    """The events of a run.
+    """Read the events of a run.
 
     Args:
-        where: place of the tables, for messages.
+        where: name of the file of the tables, for messages.
         tables: checked by :func:`check_events`.
         system: to act on.
-        followed: its inputs that follow a table.
+        followed: inputs that follow a table.
 
     Raises:
         InputError: an event cannot happen to this system.
@@ -524,16 +482,13 @@ def read_events(
 def shared_events(
     tables: Sequence[Mapping[str, Any]], system: System
 ) -> tuple[Mapping[str, Any], ...]:
-    """The events of a scenario that can happen to another system as well."""
-
-    def can_happen(table: Mapping[str, Any]) -> bool:
-        try:
+    """Return the events of a scenario that can also happen to another system."""
+    shared = []
+    for table in tables:
+        with suppress(InputError):
             _event(table, system, ())
-        except InputError:
-            return False
-        return True
-
-    return tuple(filter(can_happen, tables))
+            shared.append(table)
+    return tuple(shared)
 
 
 def _event(table: Mapping[str, Any], system: System, followed: Collection[PortName]) -> Event:
@@ -541,7 +496,7 @@ def _event(table: Mapping[str, Any], system: System, followed: Collection[PortNa
     start = system.start_time or 0.0
     if table.get("at", start) < start:
         raise InputError(f"at = {table['at']}: before the run begins, at {start:g} s")
-    text = "stop" if key == "stop" else f"{key} {', '.join(_things(table[key]))}"
+    text = "stop" if key == "stop" else f"{key} {', '.join(_targets(table[key]))}"
     action = ACTIONS[key](table[key], system)
     for port, _ in action.inputs if isinstance(action, Set) else ():
         if port in followed:
@@ -557,8 +512,8 @@ def _event(table: Mapping[str, Any], system: System, followed: Collection[PortNa
     )
 
 
-def _things(value: Any) -> Iterator[str]:
-    """Name the targets of an event, with their values."""
+def _targets(value: Any) -> Iterator[str]:
+    """Yield the targets of an event, with their values."""
     if isinstance(value, Mapping):
         yield from (f"{name} = {_shown(each)}" for name, each in flatten(value))
     else:
@@ -590,16 +545,10 @@ def _condition(text: str, system: System) -> Condition:
 def _ports(
     system: System, text: str, causalities: Sequence[str], single: bool = False
 ) -> list[PortName]:
-    """The port of a name, or the ports of a group; a star stands for several components.
-
-    Args:
-        system: with the ports.
-        text: `component.port` or `component.group`.
-        causalities: allowed ones.
-        single: whether the name must be that of one port.
+    """Return the port of a name, or the ports of a group; a star stands for several components.
 
     Raises:
-        InputError: there is none.
+        InputError: there is none with one of the causalities, or, if `single`, there are several.
 
     """
     several = system.meant(PortName.read(text))
@@ -610,7 +559,7 @@ def _ports(
     port = system.named(several[0])
     if not system.has(port) and not single and (members := system.members(text, causalities)):
         return members
-    variable = system.component(port.component).variable(port.port)
+    variable = _variable(system, port)
     if variable.causality not in causalities:
         raise InputError(
             f"{port} has causality {variable.causality}, not {' or '.join(causalities)}"
@@ -621,8 +570,8 @@ def _ports(
 
 
 def _routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Mapped) | None]]:
-    """The inputs that a port feeds, with the transformation on the way; an input feeds itself."""
-    if system.component(port.component).variable(port.port).causality == "input":
+    """Return the inputs that a port feeds, each with its transformation; an input feeds itself."""
+    if _variable(system, port).causality == "input":
         return [(port, None)]
     routes = [(c.target, c.transformation) for c in system.connections if c.source == port]
     if not routes:
@@ -631,17 +580,17 @@ def _routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Ma
 
 
 def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
-    """The inputs that some signals reach."""
+    """Return the inputs that signals reach."""
     return tuple(
         target
-        for name in _things(names)
+        for name in _targets(names)
         for port in _ports(system, name, ("input", "output"))
         for target, _ in _routes(system, port)
     )
 
 
 def _members(name: str, value: Any, ports: Sequence[PortName]) -> Iterator[tuple[PortName, Any]]:
-    """Ports of a group with their values: one for all, or a list with one for each."""
+    """Pair the ports of a group with their values: one for all, or a list with one for each."""
     return System.paired(name, ports, value if isinstance(value, list) else [value] * len(ports))
 
 
@@ -653,7 +602,7 @@ def _altered(
     system: System,
     arriving: Callable[[System, PortName, Any, (Linear | Mapped) | None], Value],
 ) -> tuple[tuple[PortName, Value], ...]:
-    """The inputs that some signals reach, with the values that arrive there."""
+    """Return the inputs that signals reach, with the values that arrive there."""
     altered = []
     for name, value in flatten(values):
         for port, each in _members(name, value, _ports(system, name, ("input", "output"))):
@@ -668,8 +617,8 @@ def _altered(
 
 
 def _value(system: System, port: PortName, value: Any, change: (Linear | Mapped) | None) -> Value:
-    """Convert the value of an overridden signal to that of an input."""
-    variable = system.component(port.component).variable(port.port)
+    """Convert the value of an overridden signal to the value of an input."""
+    variable = _variable(system, port)
     taken = variable.typed(_text(value), str(port))
     if change is None:
         return taken
@@ -678,7 +627,7 @@ def _value(system: System, port: PortName, value: Any, change: (Linear | Mapped)
 
 
 def _offset(system: System, port: PortName, value: Any, change: (Linear | Mapped) | None) -> float:
-    """Convert the bias of a signal to that of an input."""
+    """Convert the bias of a signal to the bias of an input."""
     added = system.component(port.component).variable(port.port).difference(value, str(port))
     if isinstance(change, Mapped):
         raise InputError(f"{port} is mapped by its connection: nothing can be added to it")
@@ -694,7 +643,7 @@ def _set(values: Mapping[str, Any], system: System) -> _Action:
     parameters, inputs = [], []
     for name, value in flatten(values):
         for port, each in _members(name, value, _ports(system, name, ("parameter", "input"))):
-            variable = system.component(port.component).variable(port.port)
+            variable = _variable(system, port)
             if port in fed:
                 raise InputError(f"{port} is fed by {fed[port]}: override it")
             if variable.causality == "input":
@@ -709,10 +658,10 @@ def _set(values: Mapping[str, Any], system: System) -> _Action:
 
 
 def _reset(names: Any, system: System) -> _Action:
-    for name in _things(names):
+    for name in _targets(names):
         if system.steps.get(system.component(name).name, system.step) != system.step:
             raise InputError(f"{name} takes longer steps: it cannot be reset within one")
-    return Reset(tuple(_things(names)))
+    return Reset(tuple(_targets(names)))
 
 
 #: Any action of an event.
@@ -726,7 +675,7 @@ ACTIONS: Mapping[str, Callable[[Any, System], _Action]] = {
     "freeze": lambda names, system: Freeze(_inputs(names, system)),
     "drop": lambda names, system: Freeze(_inputs(names, system)),
     "lose": lambda names, system: Alter(
-        "override", _altered(dict.fromkeys(_things(names), 0), system, _value)
+        "override", _altered(dict.fromkeys(_targets(names), 0), system, _value)
     ),
     "release": lambda names, system: Release(_inputs(names, system)),
     "reset": _reset,

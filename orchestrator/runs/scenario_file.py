@@ -1,4 +1,4 @@
-"""Entries of a scenario file; scenario-files.md and its JSON schema are made from them."""
+"""Entries of a scenario file, and the source of scenario-files.md and its JSON schema."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from orchestrator.cosim import Experiment
 from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, needed
 from orchestrator.vehicle.signals import STANDARD
 
-#: More vehicles take longer to put together than anyone waits.
+#: Largest number of vehicles; more would take too long to load.
 MOST_VEHICLES = 10_000
 
 #: Interpolations of an input between two rows of its table; the first is the default.
 INTERPOLATIONS = ("linear", "hold")
 
-#: Actions of an event after which there is nothing left that could end.
+#: Actions of an event without a duration.
 AT_ONCE = ("release", "reset", "stop")
 
 
@@ -44,37 +44,37 @@ class InputsTable(TomlTable):
         '"inputs.csv"',
     )
     between: Annotated[str, OneOf(INTERPOLATIONS)] = entry(
-        "What a Real input does between two rows. All other inputs hold, and so do Real inputs of "
-        "variability `discrete`.",
+        "Interpolation of Real inputs between two rows. All other inputs hold their values, and so "
+        "do Real inputs of variability `discrete`.",
         f"`{INTERPOLATIONS[0]}`",
     )
 
 
-#: Entries of an event that are not what it does.
+#: Entries of an event other than its action.
 _TIMES_AND_LABEL = ("at", "when", "repeat", "duration", "label")
 
 
 class EventTable(TomlTable):
-    """Something that happens during the run: `[[events]]`."""
+    """An event of the run: `[[events]]`."""
 
     at: float = entry("When it happens [s].", "at `when`")
     when: str = entry(
         "The condition at which it happens: a signal, one of `< > <= >=`, and a number, such as "
-        '`"plant.eta.z > 5"`. It must have been false before.',
+        '`"plant.eta.z > 5"`. An event happens when its condition changes from false to true.',
         "at `at`",
     )
     repeat: bool = entry(
-        "Whether it happens each time that `when` becomes true, not only the first time.", "`false`"
+        "`true`: it happens each time that `when` becomes true, not only the first time.", "`false`"
     )
     duration: Annotated[float, Field(gt=0.0), "positive number"] = entry(
         "How long it lasts [s].", "until the run ends", key="for"
     )
-    label: str = entry("Its name in figures.", "what it does")
+    label: str = entry("Its name in figures.", "its action")
     set: dict[str, Any] = entry(
         "New values of tunable parameters, and of inputs that nothing feeds."
     )
-    override: dict[str, Any] = entry("Values that signals have from now on.")
-    bias: dict[str, Any] = entry("What is added to signals from now on.")
+    override: dict[str, Any] = entry("Values that replace signals from now on.")
+    bias: dict[str, Any] = entry("Offsets that are added to signals from now on.")
     freeze: Names = entry("Signals that keep their last value.")
     drop: Names = entry(
         "Sensors that fail: inputs that they feed keep the last value, as with `freeze`."
@@ -94,7 +94,7 @@ class EventTable(TomlTable):
         actions = [action for action in known if getattr(self, action) is not None]
         if len(actions) != 1:
             hint = f"not {' and '.join(actions)}" if actions else f"one of {', '.join(known)}"
-            raise ValueError(f"write one thing that it does, {hint}")
+            raise ValueError(f"write one action, {hint}")
         if self.duration is not None and actions[0] in AT_ONCE:
             raise ValueError(f"{actions[0]} has no duration: leave `for` out")
         if self.repeat is not None and self.when is None:
@@ -103,7 +103,7 @@ class EventTable(TomlTable):
 
 
 class CompareTable(TomlTable):
-    """A second run, which differs from the scenario in what is written here: `[compare]`."""
+    """A second run, and its differences from the scenario: `[compare]`."""
 
     name: str = needed("Name of the second run, and of its folder.", '"mine-pd"')
     label: str = entry("Name of its lines.", "its name")
@@ -124,9 +124,9 @@ class ScenarioFile(TomlTable):
     label: str = entry(
         "Name of its lines when two runs are drawn together.", "the name of the file"
     )
-    figure: str = entry("Which figure to draw.", "`tracking`")
+    figure: str = entry("Figure to draw.", "`tracking`")
     z_up: bool = entry(
-        "Whether the path is drawn with z up and y west, as in the paper's words (reading 16).",
+        "`true`: the path is drawn with z up and y west, as the paper states (reading 16).",
         "`false`: z is down and y east",
     )
     compare: CompareTable = entry(
@@ -153,10 +153,10 @@ class ScenarioFile(TomlTable):
         "The components to keep; wires to the others are removed too.", "all of them"
     )
     remark: str = entry(
-        "What the report says below the figure, in Markdown without pictures.", "none"
+        "Text of the report below the figure, in Markdown without pictures.", "none"
     )
     vehicles: Annotated[int, Field(ge=1, le=MOST_VEHICLES)] = entry(
-        "How many vehicles there are, `auv1`, `auv2` and so on, each with the closed loop: see "
+        "Number of vehicles, `auv1`, `auv2` and so on, each with the closed loop: see "
         "[several vehicles](../how-to/vehicles.md).",
         "one, whose components have no prefix",
     )
@@ -181,7 +181,7 @@ class ScenarioFile(TomlTable):
     )
     path: PathTable = entry("Waypoints of a PathPlanner, from a table: [see below](#path).", "none")
     events: list[EventTable] = entry(
-        "What happens during the run, each as `[[events]]`: [see below](#events).", "nothing"
+        "Events during the run, each as `[[events]]`: [see below](#events).", "none"
     )
     inputs: InputsTable = entry(
         "A table of inputs over time: [see below](#inputs).", "inputs keep their values"

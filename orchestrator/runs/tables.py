@@ -1,4 +1,4 @@
-"""Tables that are read: of runs, in CSV or Parquet, and of users and other tools, in CSV."""
+"""Reading tables: of runs, in CSV or Parquet, and of users and other tools, in CSV."""
 
 from __future__ import annotations
 
@@ -16,31 +16,27 @@ from orchestrator.machine.lazy import ROWS_AT_ONCE, parquet
 from orchestrator.machine.texts import finite
 from orchestrator.machine.user_files import explain_errors, open_lines
 
-#: What separates the values of a row.
+#: Separators of the values of a row, with their names.
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}
 
-#: Columns that name the time, in lower case.
+#: Names of the time column, in lower case.
 _TIME = ("time", "t")
 
-#: What ecos puts after a name.
+#: Type that ecos appends to a name.
 _TYPE = re.compile(r"\[[A-Z]+\]$")
 
-#: What a file is not that cannot be read.
+#: Default message for a file that cannot be read.
 _NO_RUN = "not a table of a run"
 
-#: What makes numbers of texts, by the places of columns.
+#: Functions from texts to numbers, by the indices of columns.
 _Converters = dict[int | str, Callable[[str], float]]
 
-#: The number of a line, and its values.
+#: Number and values of a line.
 Record = tuple[int, list[str]]
 
 
 def read_columns(path: Path, what: str = _NO_RUN) -> tuple[str, ...]:
-    """Return the names of the columns after the time.
-
-    Args:
-        path: of the file.
-        what: it is if there is a mistake in it.
+    """Return the names of the columns after the time; `what` begins the message about a mistake.
 
     Raises:
         InputError: the file is not such a table.
@@ -61,9 +57,9 @@ def read_rows(
 
     Args:
         path: of the file.
-        numbers: make numbers of the values of columns that do not hold doubles: of their texts in
-            CSV, of what Parquet has for them.
-        what: the file is if there is a mistake in it.
+        numbers: convert columns without doubles to numbers: from texts in CSV, from Parquet's own
+            values.
+        what: begins the message about a mistake.
 
     Raises:
         InputError: the file is not such a table.
@@ -95,16 +91,16 @@ def read_rows(
 def records(
     path: Path, what: str, are_names: Callable[[Sequence[str]], object]
 ) -> Iterator[tuple[list[str], Iterator[Record]]]:
-    """Read a table of CSV that a user or another tool has written.
+    """Read a table in CSV that a user or another tool has written.
 
     Args:
         path: of the file.
-        what: it is if there is a mistake in it.
-        are_names: whether its first line, taken apart, holds the names that are looked for: this
-            tells its separator, one of :data:`SEPARATORS`.
+        what: begins the message about a mistake.
+        are_names: True if the first line, split at one of :data:`SEPARATORS`, has the expected
+            names: this finds the separator.
 
     Returns:
-        The values of its first line, and the records of the others. Empty lines are left out.
+        The values of its first line, and the records of the others without empty lines.
 
     Raises:
         InputError: there is no such file, a line is not as long as the first, or a ValueError was
@@ -124,14 +120,14 @@ def records(
 
 
 def places_of_time(names: Sequence[str]) -> list[int]:
-    """Where a table has its times."""
+    """Return the indices of the time columns."""
     lowered = [name.strip().lower() for name in names]
-    found = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
-    return next(filter(None, found), [])
+    places = ([i for i, name in enumerate(lowered) if name == time] for time in _TIME)
+    return next(filter(None, places), [])
 
 
 def time_of(row: Sequence[str], clocks: Sequence[int], where: str) -> float:
-    """The time of a row; some tools write it twice, once as a variable of an FMU.
+    """Return the time of a row; some tools write it twice, once as a variable of an FMU.
 
     Raises:
         ValueError: it is not a finite number, or its columns differ.
@@ -144,11 +140,13 @@ def time_of(row: Sequence[str], clocks: Sequence[int], where: str) -> float:
 
 
 def port_of(name: str, known: Collection[str], longest: int) -> str | None:
-    """Our name of a column: some tools write component::port, [REAL] after it, or systems before.
+    """Return our name of a column that another tool has written.
+
+    Some tools write component::port, [REAL] after it, or systems before.
 
     Args:
         name: of the column.
-        known: our names; of those that it ends with, the longest counts.
+        known: our names; the longest one that the name ends with counts.
         longest: length of the longest of them.
 
     """
@@ -160,7 +158,7 @@ def port_of(name: str, known: Collection[str], longest: int) -> str | None:
 
 
 def _filled(lines: Iterable[str]) -> Iterator[str]:
-    """Lines without empty ones, unless these are within a text."""
+    """Yield lines without empty ones, unless these are within a text."""
     is_within = False
     for line in lines:
         if is_within or line.strip():
@@ -169,7 +167,7 @@ def _filled(lines: Iterable[str]) -> Iterator[str]:
 
 
 def _numbers(column: Any, convert: Callable[[Any], float] | None) -> Any:
-    """A column of Parquet as numbers."""
+    """Convert a column of Parquet to numbers."""
     if convert is None:
         return column.to_numpy(zero_copy_only=False)
     if column.null_count:
@@ -184,7 +182,7 @@ def _loaded(lines: Iterable[str], converters: _Converters) -> np.ndarray:
             converters=converters or None,
         )  # fmt: skip
     except ValueError as error:
-        # What a converter says is clearer.
+        # The message of a converter is clearer.
         raise error.__cause__ or error from None
 
 

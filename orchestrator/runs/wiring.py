@@ -18,41 +18,41 @@ from orchestrator.cosim import (
 )
 from orchestrator.machine.errors import Findings, InputError, did_you_mean
 from orchestrator.machine.user_files import is_folder
-from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, for_each, vehicle_names
+from orchestrator.runs.scenario import EACH_VEHICLE, Scenario, for_each_vehicle
 
 _WIRING = Path(__file__).with_name("closed_loop.toml")
 
 
 def read_wiring(vehicles: int | None = None) -> dict[str, Any]:
-    """The content of `closed_loop.toml`, for each of several vehicles; None: for a single one."""
+    """Read `closed_loop.toml` for each of several vehicles; None: for a single one."""
     wiring = tomllib.loads(_WIRING.read_text(encoding="utf-8"))
     if vehicles is None:
         return wiring
-    names, each = vehicle_names(vehicles), f"{EACH_VEHICLE}."
+    each = f"{EACH_VEHICLE}."
     components = {each + name: fmu for name, fmu in wiring["components"].items()}
     wires = {each + target: source and each + source for target, source in wiring["wires"].items()}
     return {
         **wiring,
-        "components": for_each(EACH_VEHICLE, names, components),
-        "wires": for_each(EACH_VEHICLE, names, wires),
+        "components": for_each_vehicle(vehicles, components),
+        "wires": for_each_vehicle(vehicles, wires),
     }
 
 
 def component_of(name: str, components: Collection[str]) -> str:
-    """The component that a port or group belongs to; of an unknown one, the text before a dot."""
+    """Return the component of a port or group; if it is unknown, the text before the first dot."""
     known = (component for component, _ in PortName.splits(name) if component in components)
     return next(known, name.partition(".")[0])
 
 
 def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
-    """The wiring of the closed loop over the FMUs in a folder.
+    """Wire the closed loop of the FMUs in a folder.
 
     Args:
         folder: with the built FMUs.
-        scenario: whose components, wires and parameters change it; None: the closed loop as is.
+        scenario: its components, wires and parameters change the loop; None: no changes.
 
     Raises:
-        Refused: a component or group of ports that the scenario names does not exist.
+        Refused: a component or group of ports of the scenario does not exist.
 
     """
     findings, wiring = Findings(), read_wiring(scenario.vehicles if scenario else None)
@@ -93,7 +93,7 @@ def closed_loop(folder: Path, scenario: Scenario | None = None) -> System:
 
 
 def _file_of(name: str, fmu: str, folder: Path) -> Path:
-    """The file of a component: a name of an FMU of the bundle, or a path."""
+    """Return the file of a component, given as the name of an FMU of the bundle, or as a path."""
     if fmu.endswith(".fmu"):
         check_built(Path(fmu))
         return Path(fmu)
@@ -106,12 +106,7 @@ def _file_of(name: str, fmu: str, folder: Path) -> Path:
 
 
 def check_built(fmu: Path) -> None:
-    """Check that an FMU is there if there is a script for it.
-
-    Raises:
-        InputError: it has to be built.
-
-    """
+    """Raise an InputError if an FMU is missing and there is a script to build it from."""
     there = [*fmu.parent.iterdir()] if is_folder(fmu.parent) else []
     for script in () if fmu in there else sorted(there):
         if script.suffix == ".py" and name_of(script.stem).lower() == fmu.stem.lower():
@@ -119,7 +114,7 @@ def check_built(fmu: Path) -> None:
 
 
 def _left_open(chosen: Mapping[str, str], wiring: Mapping[str, Any]) -> Iterator[str]:
-    """The groups of inputs that the closed loop leaves open, of all components of the same FMU."""
+    """Yield the groups of inputs that the closed loop leaves open, for all components of an FMU."""
     groups = set()
     for target, source in wiring["wires"].items():
         if source is False:
@@ -135,7 +130,7 @@ def _changed(
     wires: Mapping[str, str | bool],
     findings: Findings,
 ) -> tuple[dict[str, str], dict[str, str]]:
-    """The components and wires of a scenario."""
+    """Apply a scenario to the components and wires of the closed loop."""
     stated = {**chosen, **scenario.components}
     there = {name: str(fmu) for name, fmu in stated.items() if fmu is not False}
     for name in there:
@@ -174,7 +169,7 @@ def _changed(
 
 
 def _wire(components: Mapping[str, Component], target: str, source: str) -> list[Connection]:
-    """The connections of one wire: of ports, of terminals, or inputs of a group take namesakes."""
+    """Return the connections of a wire between ports, terminals, or the namesakes of two groups."""
     for name in (target, source):
         PortName.read(name)
     to, start = (component_of(name, components) for name in (target, source))

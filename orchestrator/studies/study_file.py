@@ -27,7 +27,7 @@ from orchestrator.machine.schema import Name, Names, OneOf, TomlTable, entry, ne
 from orchestrator.machine.texts import flatten, is_finite
 from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.runs import find_toml
-from orchestrator.runs.loading import is_path
+from orchestrator.runs.preparation import is_path
 from orchestrator.studies.study import (
     ENGINES,
     LINEAR_SPACING,

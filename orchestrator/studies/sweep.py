@@ -22,8 +22,7 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import PACKAGES
 from orchestrator.machine.lazy import progress_bar
 from orchestrator.runs.bundle import current_fmus, settings_of
-from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.preparation import Prepared, load_scenario
 from orchestrator.runs.request import FORCE, KIND, LOOP, option
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine

@@ -19,7 +19,7 @@ import pytest
 from orchestrator import simulate, sweep
 from orchestrator.commands.main import main
 from orchestrator.machine.compilers import machines_compiler
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import ready_studies

@@ -22,7 +22,7 @@ from fmus.ports.behaviour import HOOKS
 from orchestrator.commands.main import main
 from orchestrator.cosim import Experiment
 from orchestrator.machine.compilers import TARGETS, machines_compiler
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.result import read_result
 from support.markdown import DOCS, blocks
 from support.patches import patch

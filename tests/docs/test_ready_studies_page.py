@@ -8,7 +8,7 @@ from importlib import import_module
 import pytest
 from PIL import Image
 
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import names
 from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study

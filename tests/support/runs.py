@@ -19,8 +19,13 @@ from orchestrator.cosim import (
     simulate_plan,
 )
 from orchestrator.cosim.observers import CsvFile
-from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import Prepared, prepare, prepare_request, with_companion
+from orchestrator.runs.preparation import (
+    Prepared,
+    load_scenario,
+    prepare,
+    prepare_request,
+    with_companion,
+)
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop

@@ -23,8 +23,7 @@ from orchestrator.commands.main import main
 from orchestrator.cosim import Order, PortName, System, write_ssp
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import load, load_scenario
-from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.preparation import Prepared, load, load_scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.engine import FmuEngine, Point
 from orchestrator.studies.own_indices import OwnIndex

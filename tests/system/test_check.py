@@ -16,8 +16,7 @@ from orchestrator.commands.main import main
 from orchestrator.cosim import Connection, PortName, System, read_component, write_ssp
 from orchestrator.cosim.formats.archive import STRUCTURE
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import load, load_scenario
-from orchestrator.runs.preparation import prepare
+from orchestrator.runs.preparation import load, load_scenario, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.run import simulate
 from orchestrator.runs.scenario import names

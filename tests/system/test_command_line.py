@@ -16,7 +16,7 @@ from orchestrator.machine.cache import users_folder
 from orchestrator.runs import SCENARIOS_FOLDER as SCENARIOS
 from orchestrator.runs import bundle
 from orchestrator.runs.folder import LEDGER
-from orchestrator.runs.loading import load
+from orchestrator.runs.preparation import load
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.studies.study import STUDIES_FOLDER as STUDIES
 from support.texts import mentions, tells

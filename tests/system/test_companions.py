@@ -10,8 +10,7 @@ import pytest
 
 from orchestrator.commands.main import main
 from orchestrator.cosim import PortName, Table
-from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import prepare, with_companion
+from orchestrator.runs.preparation import load_scenario, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.vehicle.signals import STANDARD

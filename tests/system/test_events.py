@@ -21,8 +21,7 @@ from orchestrator import load, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim import Table
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import prepare, with_companion
+from orchestrator.runs.preparation import load_scenario, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.vehicle.signals import tracking_error

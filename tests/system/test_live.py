@@ -183,8 +183,7 @@ def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path
     options = (*reduction._OPTIONS, "-include", str(SAME_FUNCTIONS))
     monkeypatch.setattr(reduction, "_OPTIONS", options)
     reduction.library_of.cache_clear()
-    for room in ("runs.loading", "runs.preparation"):
-        monkeypatch.setattr(f"orchestrator.{room}.current_fmus", lambda *_: fmus)
+    monkeypatch.setattr("orchestrator.runs.preparation.current_fmus", lambda *_: fmus)
     for name in names():
         for i, run in enumerate(presets.runs_of(name)):
             table = Table()

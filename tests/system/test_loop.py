@@ -33,7 +33,7 @@ from orchestrator.cosim import (
 from orchestrator.cosim.fmi.instance import Ended
 from orchestrator.cosim.hooks import NEVER
 from orchestrator.machine.errors import StartError
-from orchestrator.runs.loading import load
+from orchestrator.runs.preparation import load
 from orchestrator.runs.wiring import closed_loop
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems

@@ -15,8 +15,7 @@ from orchestrator.commands.main import main
 from orchestrator.cosim import Experiment, Isolation, System, Table, make_plan, simulate_plan
 from orchestrator.cosim.stages import arrange
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import load
-from orchestrator.runs.preparation import prepare
+from orchestrator.runs.preparation import load, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.run import simulate as simulated
 from orchestrator.runs.scenario import Scenario

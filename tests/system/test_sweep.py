@@ -15,7 +15,7 @@ import pytest
 from fmus.kinds import KINDS
 from orchestrator import sweep
 from orchestrator.commands.main import main
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import FmuEngine

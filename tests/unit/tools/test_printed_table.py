@@ -11,7 +11,7 @@ import pytest
 from orchestrator import simulate
 from orchestrator.cosim import PortName
 from orchestrator.paper.claims import approach_of
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from printed_table import (
     CHOICES,

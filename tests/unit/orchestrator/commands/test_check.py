@@ -1,4 +1,4 @@
-"""All that is wrong with a file is said at once, and what is only surprising with it."""
+"""`auv-fmu check` reports all mistakes of a file at once, and surprises."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 
 @pytest.fixture
 def fmu(tmp_path):
-    """Makes an FMU of a description in which some words are others."""
+    """Make an FMU of a description with replaced words."""
 
     def make(*changes: tuple[str, str]) -> Path:
         text = DESCRIPTION
@@ -46,8 +46,8 @@ def fmu(tmp_path):
     return make
 
 
-def said_of(path: Path) -> list[str]:
-    """What `auv-fmu check` says of an FMU, without its binary."""
+def lines_about(path: Path) -> list[str]:
+    """Lines of `auv-fmu check` about an FMU, without its binary."""
     findings = Findings()
     component = examine(path, findings)
     assert (component is None) == bool(findings.problems)
@@ -56,8 +56,8 @@ def said_of(path: Path) -> list[str]:
     return [f"{kind}: {text}" for kind in texts for text in texts[kind]]
 
 
-def test_of_a_good_fmu_nothing_is_said(fmu):
-    assert said_of(fmu()) == []
+def test_a_valid_fmu_has_no_problems(fmu):
+    assert lines_about(fmu()) == []
 
 
 @pytest.mark.parametrize(
@@ -81,18 +81,18 @@ def test_of_a_good_fmu_nothing_is_said(fmu):
         ("problem", ("<CoSimulation", "<ModelExchange"), "co-simulation"),
     ],
 )
-def test_what_is_wrong_or_surprising_is_said(fmu, kind, change, said):
-    lines = [line for line in said_of(fmu(change)) if line.startswith(f"{kind}: ")]
+def test_mistakes_and_surprises_are_reported(fmu, kind, change, said):
+    lines = [line for line in lines_about(fmu(change)) if line.startswith(f"{kind}: ")]
     assert any(mentions(line, said) for line in lines), lines
 
 
-def test_all_mistakes_are_said_at_once(fmu):
+def test_all_mistakes_are_reported_at_once(fmu):
     changes = [('start="1"', 'start="3"'), ('dependencies="1"', 'dependencies="0"')]
-    lines = said_of(fmu(*changes))
+    lines = lines_about(fmu(*changes))
     for word in ("odd.p", "variable '0'"):
         assert any(word in line for line in lines)
 
 
-def test_what_is_no_file_is_one_problem(tmp_path):
-    [line] = said_of(tmp_path / "none.fmu")
+def test_a_missing_file_is_one_problem(tmp_path):
+    [line] = lines_about(tmp_path / "none.fmu")
     assert line.startswith("problem: ")

@@ -1,4 +1,4 @@
-"""Every command says what it does and gives an example that its own parser takes."""
+"""Every command has a description, and an example that its parser accepts."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_every_option_says_what_it_is(name):
 
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_misspelt_option_of_any_command_is_answered_with_its_usage_and_a_suggestion(name, capsys):
-    """Of whatever the parser of a command has; each without its third letter."""
+    """Each option without its third letter."""
     command = commands_of(parser([name]))[name]
     _, _, *words = shlex.split(command.epilog.removeprefix("Example: "))
     for action in command._actions:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from orchestrator.cosim.experiment import MOST_STEPS, Experiment
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import load
+from orchestrator.runs.preparation import load
 
 
 @given(step=st.floats(1e-3, 1.0), n=st.integers(1, 200), rest=st.floats(0.0, 0.99))

@@ -25,8 +25,7 @@ from orchestrator.cosim.events import MOST_LISTED, Action, occurrence
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import Text
-from orchestrator.runs.loading import load_scenario
-from orchestrator.runs.preparation import Prepared, prepare, with_companion
+from orchestrator.runs.preparation import Prepared, load_scenario, prepare, with_companion
 from orchestrator.runs.request import Request
 from support.events import ALL, ENDS
 from support.programs import compiled, play

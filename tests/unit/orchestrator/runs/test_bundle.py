@@ -1,4 +1,4 @@
-"""The bundle is written where it is missing or stale, and never over what is the user's."""
+"""The bundle is written if it is missing or outdated, and never over files of the user."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ def folder(dist: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return shutil.copytree(dist, tmp_path / "bundle")
 
 
-def test_what_is_up_to_date_is_not_written_again(folder: Path):
+def test_files_that_are_up_to_date_are_not_written_again(folder: Path):
     before = {path: path.stat().st_mtime_ns for path in folder.iterdir()}
     assert build_bundle(folder) == []
     assert {path: path.stat().st_mtime_ns for path in folder.iterdir()} == before
 
 
-def test_what_is_missing_or_stale_is_written(folder: Path):
+def test_a_missing_file_is_written(folder: Path):
     whole = (folder / "auv.ssp").read_bytes()
     (folder / "auv.ssp").unlink()
     assert build_bundle(folder) == [folder / "auv.ssp"]
     assert (folder / "auv.ssp").read_bytes() == whole
 
 
-def test_a_file_that_was_changed_since_is_the_users(folder: Path):
+def test_a_changed_file_is_the_users(folder: Path):
     (folder / "SHA256SUMS").write_text("mine")
     with pytest.raises(InputError, match="SHA256SUMS"):
         build_bundle(folder)
@@ -44,7 +44,7 @@ def test_a_file_that_was_changed_since_is_the_users(folder: Path):
     assert "mine" in {path.read_bytes().decode("latin-1") for path in folder.iterdir()}
 
 
-def test_checksums_are_of_the_files_beside_them(dist: Path):
+def test_checksums_are_of_all_fmus_and_the_ssp(dist: Path):
     sums = dict(line.split()[::-1] for line in (dist / "SHA256SUMS").read_text().splitlines())
     assert sums.keys() == {path.name for path in (*dist.glob("*.fmu"), dist / "auv.ssp")}
     for name, digest in sums.items():
@@ -52,7 +52,7 @@ def test_checksums_are_of_the_files_beside_them(dist: Path):
     assert settings_of(dist)["kind"] == "python"
 
 
-def test_a_build_that_fails_leaves_what_was_there(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_build_that_fails_leaves_the_earlier_files(folder: Path, monkeypatch: pytest.MonkeyPatch):
     def fails(*_: object, hear: object) -> None:
         raise InputError("no compiler")
 
@@ -72,7 +72,7 @@ def test_runs_share_the_fmus_of_a_kind():
 
 @pytest.fixture
 def builds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The kinds that are built; there is a compiler, and nothing is kept."""
+    """Kinds that are built, with a compiler and an empty cache."""
     built = []
 
     def run_fmus(module: str, folder: Path, *options: str) -> None:

@@ -1,4 +1,4 @@
-"""A folder of results changes all at once or not at all, and only files of ours are replaced."""
+"""A folder of results changes all at once or not at all, and the files of the user stay."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def write_half(
 
 
 def settle(folder: Path) -> None:
-    """Undo what a killed process has half done, as the next command does."""
+    """Undo the publication of a killed process, as the next command does."""
     with open_ledger(folder):
         pass
 
@@ -67,13 +67,13 @@ def files(folder: Path) -> set[str]:
 
 
 def seen(folder: Path) -> dict[str, bytes]:
-    """The result as the commands see it that only read; empty, where there is no record."""
+    """Files of the result for commands that only read; empty without a record."""
     record = locate(folder / RECORD)
     names = json.loads(record.read_text())["files"] if record.is_file() else []
     return {name: locate(folder / name).read_bytes() for name in names}
 
 
-def test_earlier_files_go_and_those_of_others_stay(tmp_path: Path):
+def test_earlier_files_of_the_program_are_removed_and_other_files_stay(tmp_path: Path):
     write(tmp_path / "r", "a.csv", "old.png", "below/b.csv", text="old")
     (tmp_path / "r" / "notes.txt").write_text("mine")
     write(tmp_path / "r", "a.csv", "new.png")
@@ -90,13 +90,13 @@ def test_after_an_exception_everything_is_as_it_was(tmp_path: Path):
     assert (tmp_path / "r" / "a.csv").read_text() == "old"
 
 
-def test_a_folder_that_was_made_for_nothing_goes(tmp_path: Path):
+def test_a_new_folder_is_removed_after_an_error(tmp_path: Path):
     with pytest.raises(InputError, match="no scenario"), replace_files(tmp_path / "r"):
         raise InputError("no scenario")
     assert not (tmp_path / "r").exists()
 
 
-def test_what_a_killed_run_has_left_goes_with_the_next(tmp_path: Path):
+def test_the_next_run_removes_the_files_of_a_killed_one(tmp_path: Path):
     def killed() -> None:
         with replace_files(tmp_path / "r") as unfinished:
             (unfinished / "result.csv").write_text("half")
@@ -130,7 +130,7 @@ def test_second_run_into_the_same_folder_is_refused(tmp_path: Path):
     write(tmp_path / "r", "a.csv")
 
 
-def test_a_failing_disk_keeps_what_was_there_and_what_is_worth_it(tmp_path: Path):
+def test_a_failing_disk_keeps_the_earlier_files_and_new_rows(tmp_path: Path):
     write(tmp_path / "r", "a.csv", text="old")
     before = contents(tmp_path)
     full = OSError(errno.ENOSPC, "No space left on device")
@@ -147,7 +147,7 @@ def test_a_failing_disk_keeps_what_was_there_and_what_is_worth_it(tmp_path: Path
 @pytest.mark.parametrize("call", ["fsync", "replace"])
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EIO, errno.EXDEV, errno.EDQUOT])
 def test_a_disk_that_fails_at_the_last_moment(tmp_path: Path, monkeypatch, call, number):
-    """As a server does that takes everything and says only then that it cannot keep it."""
+    """As on a server that reports a full disk only at the end."""
     write(tmp_path / "r", "a.csv", text="old")
     before = contents(tmp_path)
 
@@ -158,7 +158,7 @@ def test_a_disk_that_fails_at_the_last_moment(tmp_path: Path, monkeypatch, call,
     monkeypatch.setattr(os, call, fail)
     with pytest.raises(InputError, match=rf"{os.strerror(number)}; what was written is in"):
         write(tmp_path / "r", "a.csv", keep=lambda: True)
-    # Without a record that says that it came to its end.
+    # Without a record, which states that the run was completed.
     assert contents(tmp_path) == before | {"r/incomplete/a.csv": b"new"}
 
 
@@ -172,7 +172,7 @@ def test_a_file_system_without_fsync_is_written_all_the_same(tmp_path: Path, mon
 
 
 def test_everything_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch):
-    """After a power cut a name may lead to an empty file, if the contents were not there first."""
+    """After a power cut a name may lead to an empty file if the contents were not written first."""
     calls: list[tuple[str, str]] = []
     fsync, replace = os.fsync, os.replace
 
@@ -188,7 +188,7 @@ def test_everything_is_on_the_disk_before_it_counts(tmp_path: Path, monkeypatch)
     monkeypatch.setattr(os, "replace", recorded_replace)
     write(tmp_path / "r", "a.csv", "below/b.csv")
     names = [(call, Path(path).name) for call, path in calls]
-    # Ledgers: the first, the one with the files that are moved, and the one from which they count.
+    # Ledgers: the first, the one with the moving files, and the one that makes them count.
     _, moving, counting = (i for i, name in enumerate(names) if name == ("replace", LEDGER))
     assert {("fsync", name) for name in ("a.csv", "b.csv", "below", RECORD)} < set(names[:moving])
     assert names[moving + 1] == ("fsync", "r")
@@ -216,7 +216,7 @@ def test_killed_at_any_moment_the_folder_holds_the_old_result_or_the_new_one(tmp
         write_old(folder)
         if not killed_at(n, lambda: write_new(folder)):
             break
-        # A record says that all that it names is there, also while files take their places.
+        # All files in a record exist, also during a publication.
         assert seen(folder) in (contents(old), contents(new)), n
         settle(folder)
         visible = {k: v for k, v in contents(folder).items() if not k.startswith(".")}
@@ -235,7 +235,7 @@ def test_killed_again_while_the_next_command_undoes_it(tmp_path: Path):
     def begin() -> None:
         rmtree(folder, ignore_errors=True)
         write(folder, "a.csv", "old.png", text="old")
-        # When all new files are in their places, but do not count yet.
+        # All new files have been moved, but do not count yet.
         assert killed_at(7, lambda: write(folder, "a.csv", "new.png"), ["replace"])
         assert (folder / "a.csv").read_text() == "new"
         assert locate(folder / "a.csv").read_text() == "old"
@@ -255,7 +255,7 @@ def test_killed_again_while_the_next_command_undoes_it(tmp_path: Path):
 
 
 @pytest.mark.parametrize("name", ["../precious", "/etc/hostname", "notes.txt"])
-def test_somebody_elses_record_proves_nothing(tmp_path: Path, name):
+def test_a_record_without_a_ledger_owns_no_file(tmp_path: Path, name):
     (tmp_path / "precious").write_text("mine")
     (tmp_path / "r").mkdir()
     (tmp_path / "r" / "notes.txt").write_text("mine")
@@ -266,7 +266,7 @@ def test_somebody_elses_record_proves_nothing(tmp_path: Path, name):
     assert contents(tmp_path) == before
 
 
-def test_a_run_that_came_to_no_end_stands_beside_a_whole_one_until_the_next(tmp_path: Path):
+def test_a_failed_result_is_kept_until_the_next_complete_one(tmp_path: Path):
     write(tmp_path / "r", "a.csv", text="whole")
     write(tmp_path / "r", "a.csv", "below/b.csv", text="half", failure="interrupted")
     assert (tmp_path / "r" / "a.csv").read_text() == "whole"
@@ -276,8 +276,8 @@ def test_a_run_that_came_to_no_end_stands_beside_a_whole_one_until_the_next(tmp_
     assert not (tmp_path / "r" / "incomplete").exists()
 
 
-def test_a_link_called_incomplete_leads_nowhere(tmp_path: Path):
-    """Though what is there was written by a run."""
+def test_a_link_named_incomplete_is_not_followed(tmp_path: Path):
+    """Although it leads to the files of a run."""
     write(tmp_path / "other", "a.csv")
     (tmp_path / "r").mkdir()
     (tmp_path / "r" / "incomplete").symlink_to(tmp_path / "other")
@@ -289,7 +289,7 @@ def test_a_link_called_incomplete_leads_nowhere(tmp_path: Path):
     assert after["r/incomplete-2/a.csv"] == b"half"
 
 
-def test_rows_are_kept_that_cannot_go_beside_a_whole_result(tmp_path: Path, monkeypatch):
+def test_rows_are_kept_if_the_staging_folder_cannot_be_renamed(tmp_path: Path, monkeypatch):
     write(tmp_path / "r", "a.csv", text="whole")
 
     def fail(*_: object) -> None:
@@ -302,7 +302,7 @@ def test_rows_are_kept_that_cannot_go_beside_a_whole_result(tmp_path: Path, monk
     assert (tmp_path / "r" / "incomplete" / "a.csv").read_text() == "half"
 
 
-def test_a_run_that_came_to_no_end_takes_the_place_of_another_such(tmp_path: Path):
+def test_a_failed_result_replaces_a_failed_one(tmp_path: Path):
     write(tmp_path / "r", "a.csv", text="half", failure="interrupted")
     write(tmp_path / "r", "a.csv", failure="stopped")
     assert (tmp_path / "r" / "a.csv").read_text() == "new"
@@ -315,10 +315,11 @@ def test_a_folder_in_the_way_changes_nothing(tmp_path: Path):
         write(tmp_path / "r", "a.csv", "z.csv")
     assert (tmp_path / "r" / "a.csv").read_text() == "old"
     assert (tmp_path / "r" / RECORD).is_file()
+    put(tmp_path / "r", "new", "z.csv", force=True)
+    assert (tmp_path / "r" / "z.csv.~1~").is_dir()
 
 
-def test_what_is_no_result_takes_the_place_of_none(tmp_path: Path):
-    """An export into the folder of a run."""
+def test_an_export_does_not_replace_a_result(tmp_path: Path):
     write(tmp_path / "r", "a.csv", text="whole")
     with replace_files(tmp_path / "r") as unfinished:
         (unfinished / "fig4.ssp").write_text("exported")
@@ -347,7 +348,7 @@ def put(folder: Path, text: str, *names: str, force: bool = False) -> Ledger:
     return ledger
 
 
-def test_what_was_written_is_replaced_and_what_was_changed_is_not(tmp_path: Path):
+def test_unchanged_files_are_replaced_and_changed_files_are_not(tmp_path: Path):
     put(tmp_path, "first", "a", "below/b")
     put(tmp_path, "second", "a", "below/b")
     assert contents(tmp_path) == {"a": b"second", "below/b": b"second"}
@@ -362,15 +363,7 @@ def test_what_was_written_is_replaced_and_what_was_changed_is_not(tmp_path: Path
     assert contents(tmp_path) == {"a": b"third", "below/b": b"third", "below/b.~1~": b"mine"}
 
 
-def test_folder_that_is_in_the_way_is_called_one(tmp_path: Path):
-    (tmp_path / "a").mkdir()
-    with pytest.raises(Taken, match="/a is a folder: move it"):
-        put(tmp_path, "ours", "a")
-    put(tmp_path, "ours", "a", force=True)
-    assert (tmp_path / "a.~1~").is_dir()
-
-
-def test_what_was_changed_is_not_removed(tmp_path: Path):
+def test_changed_files_are_not_removed(tmp_path: Path):
     ledger = put(tmp_path, "ours", "a", "b", "below/c")
     (tmp_path / "a").write_text("mine")
     ledger.remove(["a", "b", "below/c"])
@@ -379,8 +372,8 @@ def test_what_was_changed_is_not_removed(tmp_path: Path):
 
 
 @pytest.mark.parametrize("name", ["a", "below/a"])
-def test_links_lead_nowhere(tmp_path: Path, name):
-    """Neither of a file nor of a folder, though there is what was written."""
+def test_links_are_not_followed(tmp_path: Path, name):
+    """To a file or to a folder, although they lead to the written file."""
     folder, elsewhere = tmp_path / "r", tmp_path / "elsewhere"
     folder.mkdir()
     put(folder, "ours", name)
@@ -397,7 +390,7 @@ def test_links_lead_nowhere(tmp_path: Path, name):
     "content",
     ["mine", "{}", "[]", '{"identity": "0", "files": {}}', sealed({"identity": "x"})],
 )
-def test_a_list_that_is_none_of_ours_proves_nothing(tmp_path: Path, content):
+def test_an_invalid_ledger_is_refused_or_moved_aside(tmp_path: Path, content):
     (tmp_path / LEDGER).write_text(content)
     with pytest.raises(Taken, match="its own files are unknown"):
         Ledger(tmp_path)
@@ -417,7 +410,7 @@ def test_a_forged_ledger_does_not_lead_out_of_the_folder(tmp_path: Path, name, e
 
 @pytest.mark.parametrize("link", ["", ".earlier", ".earlier/below", ".earlier/below/key"])
 def test_a_forged_ledger_moves_nothing_from_elsewhere(tmp_path: Path, link):
-    """Somebody's folder may come with a ledger, and with links to files of the user's."""
+    """A folder of another person may contain a ledger, and links to files of the user's."""
     folder, elsewhere = tmp_path / "r", tmp_path / "elsewhere"
     staging, path = folder / (".auv-fmu-" + "0" * 32), Path(".earlier/below/key")
     (elsewhere / path.parent).mkdir(parents=True)
@@ -449,9 +442,9 @@ def test_a_forged_ledger_moves_nothing_elsewhere(tmp_path: Path, link):
     assert not list(elsewhere.rglob("key"))
 
 
-def test_what_the_user_has_put_in_the_way_of_earlier_files_stays(tmp_path: Path):
+def test_files_of_the_user_stay_if_they_are_in_the_way_of_earlier_ones(tmp_path: Path):
     put(tmp_path, "old", "a", "below/b")
-    # When the new files are in their places, but do not count yet.
+    # The new files have been moved, but do not count yet.
     assert killed_at(5, lambda: put(tmp_path, "new", "a", "below/b"), ["replace"])
     (tmp_path / "a").write_text("mine")
     rmtree(tmp_path / "below")
@@ -468,7 +461,7 @@ def test_what_the_user_has_put_in_the_way_of_earlier_files_stays(tmp_path: Path)
 
 
 def test_no_link_is_written_through(tmp_path: Path):
-    """The token of a ledger that somebody brings is known to that somebody."""
+    """The author of a forged ledger knows its token."""
     (tmp_path / "precious").write_text("mine")
     (tmp_path / "r").mkdir()
     content = {"identity": "0" * 32, "files": {}, "moving": {}}
@@ -482,7 +475,7 @@ def test_no_link_is_written_through(tmp_path: Path):
 @pytest.mark.parametrize("when", range(10))
 @pytest.mark.parametrize("kept", [["a", RECORD], ["a", "b", "below/c", "new", RECORD]])
 def test_files_that_cannot_take_their_places_leave_all_as_it_was(tmp_path, monkeypatch, kept, when):
-    """Whichever rename fails; and the next one succeeds."""
+    """Whichever rename fails; the next publication succeeds."""
     put(tmp_path, "first", "a", "b", "below/c", RECORD)
     before, replace, calls = contents(tmp_path), Path.replace, iter(range(99))
 

@@ -1,4 +1,4 @@
-"""Components to begin with are good ones, in both kinds, and are built again when they change."""
+"""Templates of components are valid in both kinds, and are built again when they change."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ from orchestrator.runs.own_components import (
 )
 from support.own import write
 
-#: The controller of the closed loop, which has its FMU from the beginning.
+#: The controller of the closed loop, which is created with its FMU.
 OF_THE_LOOP = "controller of the loop"
 
 
 @pytest.fixture(params=[*LIKENESSES, OF_THE_LOOP])
 def made(request, tmp_path) -> Path:
-    """The script of a component to begin with."""
+    """Script of a component from a template."""
     if request.param == OF_THE_LOOP:
         script, *_ = new_controller("tiny_thing", tmp_path / "tiny")
     else:
@@ -41,13 +41,14 @@ def made(request, tmp_path) -> Path:
     return script
 
 
-def test_files_bear_the_name_and_no_other(made: Path):
+def test_files_contain_the_name_and_no_other(made: Path):
     files = [path for path in made.parent.iterdir() if path.name[0] != "."]
     texts = {path.name: path.read_text() for path in files if path.suffix != ".fmu"}
     assert {*texts} == {"tiny_thing.py", "test_tiny_thing.py", "tiny_thing.toml", "README.md"}
     for text in texts.values():
         assert "own_" not in text
         assert "OwnCo" not in text
+        assert max(map(len, text.splitlines())) <= 100 or text == texts["README.md"]
 
 
 def test_its_tests_pass(made: Path):
@@ -56,11 +57,6 @@ def test_its_tests_pass(made: Path):
         cwd=made.parent, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert process.returncode == 0, process.stdout
-
-
-def test_no_line_is_longer_than_those_of_the_house(made: Path):
-    for path in made.parent.glob("*.py"):
-        assert max(map(len, path.read_text().splitlines())) <= 100
 
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -84,7 +80,9 @@ def test_both_kinds_give_the_same_numbers(made: Path, tmp_path: Path):
     assert len(tables[0]) == 51
 
 
-def test_its_scenario_runs(made: Path, capsys):
+def test_it_has_no_problems_and_its_scenario_runs(made: Path, capsys):
+    assert main(["check", str(made)]) == 0
+    assert capsys.readouterr().out == f"{made}: no problems found\n"
     assert main(["build", str(made)]) == 0
     scenario = made.with_suffix(".toml")
     assert main(["check", str(scenario)]) == 0
@@ -94,16 +92,11 @@ def test_its_scenario_runs(made: Path, capsys):
     assert told_of_an_event == ("[[events]]" in scenario.read_text())
 
 
-def test_its_check_finds_nothing(made: Path, capsys):
-    assert main(["check", str(made)]) == 0
-    assert capsys.readouterr().out == f"{made}: no problems found\n"
-
-
 @pytest.mark.parametrize(
     ("name", "why"),
     [
         ("my-law", "'my-law': not a name for a component; use letters, digits and underscores"),
-        ("class", "'class': class is a word of Python; choose another name"),
+        ("class", "'class': class is a keyword of Python; choose another name"),
         ("json", "'json': json is already a module of Python; choose another name"),
     ],
 )
@@ -120,7 +113,7 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path):
         new_component("own_thing", tmp_path)
 
 
-def test_command_says_what_to_do_next(tmp_path, monkeypatch, capsys):
+def test_command_shows_the_next_steps(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert main(["new", "component", "RainBarrel", "--like", "plant"]) == 0
     assert capsys.readouterr().out.splitlines() == [
@@ -135,7 +128,7 @@ def test_command_says_what_to_do_next(tmp_path, monkeypatch, capsys):
     ]
 
 
-def test_command_says_where_pytest_is_to_be_had(tmp_path, monkeypatch, capsys):
+def test_command_tells_how_to_install_pytest(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("orchestrator.commands.build.find_spec", lambda name: None)
     assert main(["new", "component", "pid"]) == 0
@@ -205,7 +198,7 @@ def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
         ),
     ],
 )
-def test_what_cannot_be_done_is_said_in_a_line(tmp_path, monkeypatch, capsys, arguments, why):
+def test_impossible_commands_are_refused_in_one_line(tmp_path, monkeypatch, capsys, arguments, why):
     monkeypatch.chdir(tmp_path)
     write(tmp_path)
     (tmp_path / "slave.py").write_text("class Own:\n    pass\n")

@@ -1,4 +1,4 @@
-"""What wins where a scenario, its system and the user say different things."""
+"""Values of the user win over the scenario, and values of the scenario over its system."""
 
 from __future__ import annotations
 
@@ -9,8 +9,14 @@ import pytest
 
 from orchestrator.cosim import Connection, PortName, System, read_component
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.loading import check_brings_its_own, is_path, left_behind, read_fmu
-from orchestrator.runs.preparation import DEFAULT_STEP, prepare
+from orchestrator.runs.preparation import (
+    DEFAULT_STEP,
+    check_brings_its_own,
+    is_path,
+    left_behind,
+    prepare,
+    read_fmu,
+)
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 from support.archives import fmu, variable
@@ -44,13 +50,13 @@ def test_the_user_wins_over_the_scenario_and_the_scenario_over_the_system(system
         assert getattr(prepare(scenario, owns, request).experiment, name) == expected
 
 
-def test_where_nobody_names_a_step_it_is_the_paper_s_and_a_stop_time_is_asked_for(system):
+def test_the_default_step_is_the_papers_and_a_stop_time_is_required(system):
     assert prepare(Scenario("s", stop_time=1.0), system, Request()).experiment.step == DEFAULT_STEP
     with pytest.raises(InputError, match="--stop-time"):
         prepare(Scenario("s"), system, Request())
 
 
-def test_orders_steps_and_parameters_are_the_user_s(system):
+def test_orders_steps_and_parameters_of_the_user_win(system):
     scenario = Scenario("s", stop_time=1.0, step=0.1, order="jacobi")
     owns = replace(system, steps={"a": 0.2})
     assert prepare(scenario, owns, Request()).experiment.order == "jacobi"
@@ -59,7 +65,7 @@ def test_orders_steps_and_parameters_are_the_user_s(system):
     assert found.experiment.order == "gauss-seidel"
     assert found.system.steps == {"a": 0.3, "b": 0.2}
     assert found.system.parameters[K] == 3.0
-    # What was given is left as it was.
+    # The arguments are unchanged.
     assert owns.steps == {"a": 0.2} and K not in owns.parameters
 
 
@@ -73,12 +79,12 @@ def test_orders_steps_and_parameters_are_the_user_s(system):
         (Request(loop="fast"), "'fast'"),
     ],
 )
-def test_what_cannot_be_done_is_refused_by_name(system, request_, word):
+def test_impossible_requests_are_refused_by_name(system, request_, word):
     with pytest.raises(InputError, match=word):
         prepare(Scenario("s", stop_time=1.0, step=0.1), system, request_)
 
 
-def test_inputs_that_nobody_feeds_are_doubts(system):
+def test_inputs_without_a_source_give_a_warning(system):
     scenario = Scenario("s", stop_time=1.0)
     [doubt] = prepare(scenario, system, Request()).doubts()
     assert "a.u" in doubt and "b.u" not in doubt
@@ -86,14 +92,14 @@ def test_inputs_that_nobody_feeds_are_doubts(system):
     assert prepare(scenario, system, fed).doubts() == []
 
 
-def test_a_run_is_another_one_where_its_rows_could_be_others(system):
+def test_identity_changes_with_the_parameters_and_not_with_the_loop(system):
     scenario = Scenario("s", stop_time=1.0)
     whole = prepare(scenario, system, Request())
     assert whole.identity == prepare(scenario, system, Request(loop="python")).identity
     assert whole.identity != prepare(scenario, system, Request(parameters={K: 2.0})).identity
 
 
-def test_one_fmu_is_a_system_of_itself(path: Path):
+def test_one_fmu_is_a_system(path: Path):
     found = read_fmu(path)
     assert list(found.components) == ["a"] and found.connections == ()
 
@@ -103,7 +109,7 @@ def test_paths_are_told_from_names():
     assert not any(map(is_path, ("fig4", "fig4.txt", "toml")))
 
 
-def test_what_does_not_come_along_is_named():
+def test_parts_that_are_lost_with_a_scenario_are_named():
     assert left_behind(Scenario("s")) is None
     assert "events" in str(left_behind(Scenario("s", events=[{"at": 1.0}])))
     check_brings_its_own("mine.ssp", "python")

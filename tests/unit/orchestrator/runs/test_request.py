@@ -19,7 +19,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs.request import Files, Options, Request
 from orchestrator.studies.sweep import Means
 
-#: What is only an argument of Python.
+#: Arguments in Python only.
 OF_SIMULATE = {
     "system", "parameters", "progress", "variant", "checkpoint", "checkpoint_every", "resume",
 }  # fmt: skip
@@ -101,7 +101,7 @@ def test_an_option_takes_no_other_value(wrong, capsys):
 
 @pytest.mark.parametrize("name", ["interval", "real_time", "checkpoint_every"])
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan")])
-def test_what_is_no_length_of_time_is_refused(name, value):
+def test_times_that_are_not_positive_are_refused(name, value):
     with pytest.raises(InputError, match=f"{value:g}"):
         Files(**{name: value})
 
@@ -132,7 +132,7 @@ def test_keywords_of_sweep_are_the_means():
 
 
 def test_every_keyword_arrives(monkeypatch):
-    """With a value that no other one has."""
+    """Each with its own value."""
     asked: list[Any] = []
 
     def note(*arguments: Any, **options: Any) -> None:
@@ -147,7 +147,7 @@ def test_every_keyword_arrives(monkeypatch):
     with pytest.raises(StopIteration):
         simulate("fig4", **given)
     assert {name: getattr(asked[-1], name) for name in names} == given
-    # Its check wants good values.
+    # It accepts no other values.
     monkeypatch.setattr(Means, "__post_init__", lambda _: None)
     given = {name: name for name in hints(sweep).keys() - OF_SWEEP}
     with pytest.raises(StopIteration):

@@ -1,4 +1,4 @@
-"""`Result`, its record and its files, as they were made and as they are read again."""
+"""`Result`, its record and its files are the same after they are read."""
 
 from __future__ import annotations
 
@@ -43,6 +43,14 @@ def result() -> Result:
     return simulate("fig4", stop_time=0.1)
 
 
+@pytest.fixture(scope="module")
+def failed() -> Result:
+    with pytest.warns(UserWarning, match="planner is set for another vehicle"):
+        failed = simulate("fig4", {"plant.d11": 1e4})
+    assert failed.failure is not None
+    return failed
+
+
 def test_package_shows_its_names():
     names = {"Result", "StudyResult", "load", "read", "simulate", "sweep"}
     assert set(orchestrator.__all__) == names <= set(dir(orchestrator))
@@ -59,7 +67,7 @@ def test_stored_result_is_the_same_again(result, tmp_path):
         assert (again.columns, again.failure, repr(again)) == (result.columns, None, repr(result))
         assert dict(again.parameters) == dict(result.parameters)
         assert again.metrics() == result.metrics()
-        # And once more, from what was read.
+        # A result that was read can be saved, too.
         twice = read(again.save(tmp_path / f"again-{ending}", format="csv"))
         assert np.array_equal(twice.rows, result.rows)
         assert twice.metrics() == result.metrics()
@@ -79,7 +87,7 @@ def is_the_same(one: Result, other: Result) -> bool:
 
 
 @pytest.mark.parametrize("loop", ["python", "compiled"])
-def test_a_result_is_copied_with_all_that_it_has(tmp_path, loop):
+def test_a_copied_result_is_the_same(tmp_path, loop):
     if loop == "compiled" and find_compiler() is None:
         pytest.skip("there is no C compiler")
     events = [{"at": 0.04, "lose": "controller.tau.r"}]
@@ -96,8 +104,8 @@ def test_a_result_is_copied_with_all_that_it_has(tmp_path, loop):
 
 
 @pytest.mark.parametrize("method", ["spawn", *slow("fork", "forkserver")])
-def test_a_result_comes_out_of_a_pool_of_processes(tmp_path, method):
-    """Also after the process that has made it has ended, with all that it had unpacked."""
+def test_a_result_is_returned_by_a_pool_of_processes(tmp_path, method):
+    """Also after the process that made it has ended, and removed its unpacked FMUs."""
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip(f"there is no {method} here")
     context = multiprocessing.get_context(method)
@@ -108,27 +116,28 @@ def test_a_result_comes_out_of_a_pool_of_processes(tmp_path, method):
     assert np.array_equal(read(found.save(tmp_path)).rows, found.rows)
 
 
-def test_failure_and_events_are_read_again(tmp_path):
+def test_failure_and_events_are_read_again(failed, tmp_path):
     events = [{"at": 0.04, "lose": "controller.tau.r"}, {"at": 0.08, "stop": True}]
     made = simulate("fig4", stop_time=0.2, events=events)
     again = read(made.save(tmp_path / "stopped"))
     assert len(again.events) == 2
     assert again.events == made.events
-    failed = simulate("fig4", {"plant.d11": 1e4})
-    assert failed.failure is not None
     assert read(failed.save(tmp_path / "failed")).failure == failed.failure
 
 
-def test_stored_result_that_was_changed_is_told(result, tmp_path):
+def test_a_changed_result_gives_a_warning(result, tmp_path):
     table = result.save(tmp_path) / "result.csv"
     table.write_text(table.read_text().replace("0.02,", "0.021,", 1))
     with pytest.warns(UserWarning, match=r"result\.csv was changed since the run wrote it"):
         read(tmp_path)
+    (tmp_path / "run.json").unlink()
+    with pytest.warns(UserWarning, match=r"result\.csv was changed since the run wrote it"):
+        assert read_result(tmp_path).result.time[1] == 0.021
     with pytest.raises(ValueError, match=r"holds no result\.csv"):
         read(tmp_path / "nothing")
 
 
-def test_indices_that_no_run_wrote_are_refused(result, tmp_path):
+def test_invalid_indices_are_refused(result, tmp_path):
     (result.save(tmp_path) / "metrics.json").write_text("[1]\n")
     stored = read(tmp_path)
     with pytest.raises(ValueError, match=r"metrics\.json: not the indices of a run"):
@@ -162,7 +171,7 @@ def test_figure_is_the_one_that_the_command_line_draws(result, tmp_path):
     assert result.figure()._repr_png_().startswith(b"\x89PNG")
 
 
-def test_figure_that_is_not_there_is_told(result):
+def test_unknown_figures_are_refused(result):
     for asked, complaint in (
         ({"name": "trackin"}, "no figure 'trackin'; did you mean tracking"),
         ({"vehicle": "second"}, "no vehicle 'second'"),
@@ -226,15 +235,13 @@ def test_parameters_are_a_mapping_by_text(result):
     assert len(values) == len(result.parameters)
 
 
-def test_repr_is_one_line_and_tells_a_failure(result):
+def test_repr_is_one_line_with_the_failure(result, failed):
     assert repr(result) == "<Result fig4: 6 rows of 106 columns, 0 to 0.1 s, feedthrough>"
-    failed = simulate("fig4", {"plant.d11": 1e4})
-    assert failed.failure is not None
     assert failed.failure in repr(failed)
     assert 0 < len(failed) < 5001
 
 
-def test_saved_result_is_that_of_the_command_line(result, tmp_path):
+def test_saved_files_equal_the_files_of_the_command_line(result, tmp_path):
     saved, written = result.save(tmp_path / "saved"), tmp_path / "written"
     arguments = ["run", "fig4", "--stop-time", "0.1", "--no-figures", "--out", str(written)]
     assert main(arguments) == 0
@@ -290,11 +297,11 @@ LOOPS = st.lists(st.builds(Loop, NAMES, NAMES, NAMES, NAMES), min_size=1, max_si
 
 
 @given(HEADERS, ENDINGS, LOOPS)
-def test_all_that_is_written_of_a_table_is_read_again(header, ending, loops):
+def test_header_ending_and_loops_are_read_from_a_record_as_they_were_written(header, ending, loops):
     content = json.loads(in_json(content_of(header, ending, loops)), parse_constant=pytest.fail)
     found = header_in(content, header.columns)
     assert found == header
-    # Equality does not look at these, nor tell 1, 1.0 and True apart.
+    # Equality ignores these, and does not distinguish 1, 1.0 and True.
     assert (found.loop, found.units) == (header.loop, header.units)
     assert repr(found.parameters) == repr(dict(header.parameters))
     assert ending_in(content) == ending
@@ -344,7 +351,7 @@ def test_a_table_is_read_with_its_record_or_without(folder):
         {"experiment": {"step": -0.5, "stop_time": 1.0}},
     ],
 )  # fmt: skip
-def test_a_record_that_no_run_has_written_is_refused_by_name(folder, change):
+def test_invalid_records_are_refused_by_name(folder, change):
     file = folder / "run.json"
     file.write_text(json.dumps({**json.loads(file.read_text()), **change}))
     with pytest.raises(InputError, match=r"run\.json"):
@@ -358,7 +365,7 @@ def test_rows_without_a_step_are_refused(tmp_path, text):
         read_result(tmp_path / "t.csv")
 
 
-def test_a_run_lasts_as_long_as_it_does_whatever_the_clock_says(monkeypatch):
+def test_duration_does_not_depend_on_the_clock(monkeypatch):
     monkeypatch.setattr("orchestrator.runs.result.monotonic", iter([5.0, 7.25]).__next__)
     times = Stopwatch().times()
     assert times["seconds"] == 2.25

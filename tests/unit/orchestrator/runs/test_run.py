@@ -1,4 +1,4 @@
-"""`simulate` and `load`, the columns of tables, and checkpoints, as a picky user tries them."""
+"""`simulate` and `load`, the columns of tables, and checkpoints."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_help_explains_every_argument():
         ("controller.saturation", "algebraic", "algebraic"),
     ],
 )
-def test_values_are_taken_as_they_come(name, value, taken):
+def test_values_may_have_types_of_python_and_numpy(name, value, taken):
     result = simulate("fig4", {name: value}, stop_time=0.02)
     assert result.parameters[name] == taken
     assert result.metrics()["parameters"] == {name: taken}
@@ -67,7 +67,9 @@ def test_values_are_taken_as_they_come(name, value, taken):
         ("controller.tau.u", 1.0),
     ],
 )
-def test_mistakes_are_told_in_the_words_of_the_command_line(name, value, tmp_path, capsys):
+def test_simulate_and_the_command_line_report_mistakes_in_the_same_words(
+    name, value, tmp_path, capsys
+):
     out = str(tmp_path / "out")
     assert main(["run", "fig4", "--set", f"{name}={value}", "--out", out]) == 2
     said = capsys.readouterr().err.strip().removeprefix("auv-fmu: ")
@@ -87,7 +89,7 @@ def test_mistakes_are_told_in_the_words_of_the_command_line(name, value, tmp_pat
         ({"system": "fig4", "order": "random"}, "use one of feedthrough, gauss-seidel, jacobi"),
     ],
 )
-def test_what_cannot_be_run_is_told(arguments, complaint):
+def test_systems_and_options_that_cannot_be_run_are_refused(arguments, complaint):
     with pytest.raises(ValueError, match=complaint):
         simulate(**arguments)
 
@@ -151,7 +153,7 @@ def test_dictionary_is_a_scenario_like_its_file(tmp_path):
         ({"parameters": {"plant.eta0": [1.0]}}, "plant.eta0: takes 6 values, not 1"),
     ],
 )
-def test_mistakes_in_a_dictionary_are_told(table, complaint):
+def test_mistakes_in_a_dictionary_are_refused(table, complaint):
     with pytest.raises(ValueError, match=complaint):
         simulate(table)
 
@@ -166,7 +168,7 @@ def test_mistakes_in_a_dictionary_are_told(table, complaint):
         ({"plant.eta0.y": 7, "plant.eta0": [0] * 6}, (0.0,) * 6),
     ],
 )
-def test_list_is_for_the_members_of_a_group(given, pose):
+def test_a_list_sets_the_members_of_a_group(given, pose):
     members = [f"plant.eta0.{name}" for name in ("x", "y", "z", "phi", "theta", "psi")]
     for result in (
         simulate("fig4", given, stop_time=0.02),
@@ -204,11 +206,11 @@ def test_columns_are_chosen_by_patterns(system, wanted, columns):
     assert selected_columns(system, wanted, is_companion=True) == columns.split()
 
 
-def test_all_columns_are_no_choice(system):
+def test_all_columns_need_no_names(system):
     assert selected_columns(system, "all") is None
 
 
-def test_a_pattern_of_nothing_is_refused_except_where_another_run_has_it(system):
+def test_a_pattern_without_columns_is_refused_unless_another_run_has_them(system):
     for wanted in ("a.k", "a.u,c.*"):
         with pytest.raises(InputError, match=wanted[-3:].replace("*", r"\*")):
             selected_columns(system, wanted)
@@ -221,14 +223,14 @@ def test_a_pattern_of_nothing_is_refused_except_where_another_run_has_it(system)
 # Checkpoints
 
 
-def test_checkpoints_are_made_only_where_they_are_wanted(tmp_path):
+def test_checkpoints_are_made_only_if_requested(tmp_path):
     assert checkpoints_of([], [tmp_path], None, resume=False) == []
     with pytest.raises(InputError) as error:
         checkpoints_of([], [tmp_path / "none"], None, resume=True)
     assert mentions(str(error.value), "none --checkpoint-every")
 
 
-def test_checkpoints_go_with_a_whole_run_and_else_are_named(tmp_path, monkeypatch):
+def test_checkpoints_of_a_complete_run_are_removed_and_others_are_named(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     removed: list[str] = []
 

@@ -1,4 +1,4 @@
-"""Scenario files: what each entry becomes, tables that they name, events, and mistakes by name."""
+"""Scenario files: their entries, their tables, events, and mistakes by name."""
 
 from __future__ import annotations
 
@@ -13,8 +13,7 @@ from hypothesis import strategies as st
 
 from orchestrator.cosim import Alter, Connection, Freeze, Linear, Mapped, PortName, Set, System
 from orchestrator.machine.errors import InputError, Refused
-from orchestrator.runs.loading import load, load_scenario
-from orchestrator.runs.preparation import prepare
+from orchestrator.runs.preparation import load, load_scenario, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import (
     Difference,
@@ -77,7 +76,7 @@ def test_entries_are_read_and_paths_are_relative_to_the_file(tmp_path: Path):
     assert found.digest == sha256(TEXT.encode()).hexdigest()
 
 
-def test_an_empty_file_is_the_closed_loop_as_it_is(tmp_path: Path):
+def test_an_empty_file_is_the_closed_loop(tmp_path: Path):
     found = read(tmp_path, "")
     assert found == Scenario("mine", digest=sha256(b"").hexdigest())
     assert (found.legend, found.figure, found.stop_time) == ("mine", "tracking", None)
@@ -113,7 +112,7 @@ def test_mistakes_are_named(tmp_path: Path, text: str, culprits: str):
     assert mentions(str(error.value), culprits), error.value
 
 
-def test_unknown_names_are_refused_with_those_that_there_are():
+def test_unknown_names_are_refused_with_a_suggestion():
     with pytest.raises(InputError, match="fig4"):
         read_scenario("fig44")
     assert "fig4" in names()
@@ -130,7 +129,7 @@ def read_table(tmp_path, text, between="linear", given=(), scenario="fig3a"):
     return read_inputs(Inputs(file, between), load(scenario, "native"), given)
 
 
-def test_a_run_begins_with_what_the_table_says_of_its_start(tmp_path):
+def test_a_run_begins_with_the_values_of_the_table_at_its_start(tmp_path):
     text = "time,plant.tau.u,plant.tau.q\n-1,0.0,5.0\n1,4.0,5.0\n"
     system, _ = read_table(tmp_path, text)
     assert system.parameters[U] == 2.0
@@ -140,8 +139,8 @@ def test_a_run_begins_with_what_the_table_says_of_its_start(tmp_path):
     assert system.parameters[U] == 8.0
 
 
-def test_a_straight_line_may_be_steeper_than_any_number(tmp_path):
-    """Its ends are finite, and so is all that lies between."""
+def test_interpolation_does_not_overflow(tmp_path):
+    """Between finite ends, all values are finite."""
     text = "time,plant.tau.u,plant.tau.q\n-1,-1.5e308,2.0\n1,1.5e308,4.0\n"
     system, input_table = read_table(tmp_path, text)
     assert system.parameters[U] == 0.0
@@ -171,22 +170,22 @@ def test_other_tables_have_other_digests(tmp_path):
         ("time,plant.tau.u\n0,1\n0,1,2\n", "not a table"),
     ],
 )
-def test_a_table_that_is_none_is_refused(tmp_path, text, reason):
+def test_invalid_tables_of_inputs_are_refused(tmp_path, text, reason):
     with pytest.raises(InputError) as refused:
         read_table(tmp_path, text)
     assert reason in str(refused.value)
     assert "inputs.csv: " in str(refused.value)
 
 
-def test_an_input_that_is_fed_is_refused(tmp_path):
+def test_a_connected_input_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"is fed by controller\.tau\.u"):
         read_table(tmp_path, "time,plant.tau.u\n0,1\n", scenario="fig4")
 
 
-def test_a_value_beside_the_table_is_refused(tmp_path):
+def test_a_value_in_addition_to_the_table_is_refused(tmp_path):
     with pytest.raises(InputError, match="a column of the table"):
         read_table(tmp_path, "time,plant.tau.u\n0,1\n", given=[U])
-    # On the command line it wins over what the scenario has.
+    # A table of the command line wins over the scenario.
     inputs = tmp_path / "inputs.csv"
     prepared = prepare(*load_scenario("fig3a", "native"), Request(kind="native", inputs=inputs))
     assert prepared.system.parameters[U] == 1.0
@@ -206,7 +205,7 @@ def parameters(path: Path, text: str) -> dict[str, object]:
         '"x"\t"y"\t"z"\n1\t2\t3\n4\t5\t-6.5\n\n',
     ],
 )
-def test_waypoints_are_run_through_at_the_cruise_speed(tmp_path: Path, text: str):
+def test_waypoints_without_times_are_passed_at_the_cruise_speed(tmp_path: Path, text: str):
     assert parameters(tmp_path / "path.csv", text) == {
         "planner.count": 2,
         "planner.timed": False,
@@ -238,7 +237,9 @@ def test_waypoints_with_times_are_passed_at_them(tmp_path: Path):
         ("x,y,z\n1,2,3\n1,2,nan\n", "3, z: 'nan'"),
     ],
 )
-def test_table_that_is_no_path_is_refused_in_one_line(tmp_path: Path, text: str, reason: str):
+def test_invalid_tables_of_waypoints_are_refused_in_one_line(
+    tmp_path: Path, text: str, reason: str
+):
     with pytest.raises(InputError) as error:
         parameters(tmp_path / "path.csv", text)
     assert str(error.value).startswith(f"{tmp_path / 'path.csv'}: ")
@@ -246,7 +247,7 @@ def test_table_that_is_no_path_is_refused_in_one_line(tmp_path: Path, text: str,
     assert "\n" not in str(error.value)
 
 
-def test_path_of_a_scenario_lies_beside_it_and_goes_to_its_planner(tmp_path: Path):
+def test_path_of_a_scenario_is_relative_to_it_and_sets_its_planner(tmp_path: Path):
     (tmp_path / "path.csv").write_text("x,y,z\n0,0,0\n9,0,0\n")
     found = read(tmp_path, '[path]\nfile = "path.csv"\ncomponent = "leader"\n')
     assert found.parameters[PortName.read("leader.waypoint[2].x")] == 9.0
@@ -274,7 +275,7 @@ def ports(*ports):
     return tuple(map(PortName.read, ports))
 
 
-def test_an_output_means_whoever_it_feeds_and_an_input_itself_alone(system):
+def test_an_event_on_an_output_acts_on_the_inputs_that_it_feeds(system):
     assert action(system, lose="plant.nu_r.u") == Alter(
         "override", ((PortName("disturbance", "nu.u"), 0.0),)
     )
@@ -282,7 +283,7 @@ def test_an_output_means_whoever_it_feeds_and_an_input_itself_alone(system):
     assert action(system, freeze="controller.eta.psi") == Freeze(ports("controller.eta.psi"))
 
 
-def test_a_group_means_its_members(system):
+def test_an_event_on_a_group_acts_on_its_members(system):
     ys = ports("controller.y.x", "controller.y.y", "controller.y.z")
     assert action(system, drop="plant.y") == Freeze(ys)
     assert action(system, override={"plant.y": [1.0, 2.0, 3.0]}) == Alter(
@@ -292,7 +293,7 @@ def test_a_group_means_its_members(system):
     assert taken == Set(tuple((PortName("controller", f"K1[{i}]"), 9.0) for i in (1, 2, 3)), ())
 
 
-def test_what_is_overridden_is_transformed_as_the_signal_is(system):
+def test_events_apply_the_transformation_of_a_connection(system):
     source, target = PortName.read("plant.eta.phi"), PortName.read("controller.eta.phi")
 
     def through(transformation, **table):
@@ -303,7 +304,7 @@ def test_what_is_overridden_is_transformed_as_the_signal_is(system):
     name = "plant.eta.phi"
     assert through(degrees, override={name: 2.0}) == Alter("override", ((target, 115.0),))
     assert through(degrees, bias={name: 2.0}) == Alter("bias", ((target, 114.0),))
-    # Who listens hears something else, in its own units.
+    # A bias of the input itself is in the units of the input.
     assert through(degrees, bias={str(target): 2.0}) == Alter("bias", ((target, 2.0),))
     for kind in ("override", "bias"):
         with pytest.raises(InputError, match=rf"phi: 1e\+300 is inf where it arrives, at {target}"):
@@ -378,7 +379,7 @@ def test_to_lose_a_signal_is_to_override_it_with_zero(system, source, transforma
     ],
     ids=str,
 )
-def test_what_cannot_happen_is_refused_with_its_number(system, table, reason):
+def test_impossible_events_are_refused_with_their_number(system, table, reason):
     tables = [{"at": 0.0, "stop": True}, table]
     with pytest.raises(InputError, match=r"^here: event 2: ") as refused:
         read_tables(tables, system)
@@ -386,13 +387,13 @@ def test_what_cannot_happen_is_refused_with_its_number(system, table, reason):
     assert "\n" not in str(refused.value)
 
 
-def test_another_system_has_those_events_that_can_happen_to_it(system):
+def test_another_system_keeps_the_events_that_can_happen_to_it(system):
     tables = [{"at": 1.0, "set": {"controller.k_d": 3.0}}, {"at": 1.0, "drop": "plant.y"}]
     assert shared_events(tables, system) == tuple(tables)
     assert shared_events(tables, load("fig5-pd", "native")) == (tables[1],)
 
 
-def test_all_that_is_wrong_with_a_file_is_found_at_once(tmp_path):
+def test_all_mistakes_in_a_file_are_found_at_once(tmp_path):
     file = tmp_path / "bad.toml"
     file.write_text(
         "titel = 3\n[[events]]\nat = 1.0\nloose = 3\n[[events]]\nstop = true\n[inputs]\nfile = 3\n"

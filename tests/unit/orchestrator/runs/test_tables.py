@@ -1,4 +1,4 @@
-"""Tables of runs and of other tools, read to the last bit or refused in one line."""
+"""Tables of runs and of other tools are read exactly, or refused in one line."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from orchestrator.runs.tables import read_columns, read_rows
         ("time,a\n\xff\n", "decode"),
     ],
 )
-def test_what_is_no_table_is_refused(tmp_path: Path, text: str, why: str):
+def test_files_that_are_not_tables_are_refused(tmp_path: Path, text: str, why: str):
     path = tmp_path / "odd.csv"
     path.write_text(text, encoding="latin-1")
     with pytest.raises(InputError, match=f"not a table of a run: .*{why}") as error:
@@ -47,7 +47,7 @@ def test_tables_of_other_tools_are_read(tmp_path: Path, text: str):
     np.testing.assert_array_equal(np.vstack(list(read_rows(path))), [[0, 1], [1, 2]])
 
 
-def test_parquet_of_other_tools_is_read_where_it_holds_numbers(tmp_path: Path):
+def test_parquet_of_other_tools_is_read_if_it_holds_numbers(tmp_path: Path):
     arrow = pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `parquet`")
     path = tmp_path / "other.parquet"
@@ -58,7 +58,7 @@ def test_parquet_of_other_tools_is_read_where_it_holds_numbers(tmp_path: Path):
         list(read_rows(path))
 
 
-def test_a_table_without_rows_has_none(tmp_path: Path):
+def test_a_table_may_have_no_rows(tmp_path: Path):
     path = tmp_path / "empty.csv"
     path.write_text("time,a.b\n\n")
     assert list(read_rows(path)) == []
@@ -69,7 +69,7 @@ def test_missing_file_is_refused(tmp_path: Path):
         read_columns(tmp_path / "missing.csv")
 
 
-def test_texts_among_numbers_are_handed_over_as_they_are(tmp_path: Path):
+def test_converters_get_texts_unchanged(tmp_path: Path):
     path, texts = tmp_path / "texts.csv", []
     path.write_bytes(b'time,a.s,b.x\n0,"1,""2""",5\n\n1,"two\n\nlines,\r\n",6\n2,,7\n3, x ,8\n')
     [rows] = read_rows(path, {"a.s": lambda text: texts.append(text) or len(texts)})
@@ -77,7 +77,7 @@ def test_texts_among_numbers_are_handed_over_as_they_are(tmp_path: Path):
     assert texts == ['1,"2"', "two\n\nlines,\r\n", "", " x "]
 
 
-def test_what_cannot_be_a_number_is_said_by_who_makes_it_one(tmp_path: Path):
+def test_the_message_of_a_converter_is_shown(tmp_path: Path):
     def refuse(text: str) -> float:
         raise ValueError(f"a.s: {text} is no colour")
 
@@ -88,7 +88,7 @@ def test_what_cannot_be_a_number_is_said_by_who_makes_it_one(tmp_path: Path):
     assert str(error.value) == f"{path}: not a table of inputs: a.s: much is no colour"
 
 
-def test_a_value_that_is_missing_in_parquet_is_no_text(tmp_path: Path):
+def test_a_missing_value_in_parquet_is_refused(tmp_path: Path):
     arrow = pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     parquet = pytest.importorskip("pyarrow.parquet", reason="needs the extra `parquet`")
     path = tmp_path / "other.parquet"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from orchestrator.machine.errors import InputError, Refused
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import BATCH, Range, Sample, StopTime, ready_studies
 from orchestrator.studies.study_file import read_figures, read_study, study_of

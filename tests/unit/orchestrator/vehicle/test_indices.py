@@ -23,7 +23,7 @@ from orchestrator.cosim import (
     simulate_plan,
 )
 from orchestrator.figures.study_values import Values
-from orchestrator.runs.loading import load_scenario
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import open_store
