@@ -15,6 +15,7 @@ from PIL import Image
 
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.figures.study_figures import draw_figures
+from orchestrator.figures.study_values import Values
 from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.scenario import names
@@ -55,11 +56,8 @@ def main() -> None:
                 draw_figures(
                     entries,
                     study.title,
-                    result,
+                    Values(result, {}, legends, space.units, space.logarithmic),
                     Path(drawn),
-                    legends,
-                    space.units,
-                    space.logarithmic,
                 )
             )
             for file in sorted(Path(drawn).glob("*.png")):

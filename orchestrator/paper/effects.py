@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.output_feedback import Gains
-from orchestrator.figures.drawing import name_runs, overlay, save, styled
-from orchestrator.figures.panels import draw_commands
+from orchestrator.figures.drawing import name_runs, one_figure, save, styled
+from orchestrator.figures.run_figures import draw_commands
 from orchestrator.figures.style import COLOURS, FIGURE_WIDTH, STYLES, Drawn
 from orchestrator.paper.claims import EFFORT_PD, EFFORT_PROPOSED, FIVE, FIVE_PD, QUIET, SEVEN
 from orchestrator.paper.kept_runs import KeptRun
@@ -135,7 +135,7 @@ def disturbance(*sevens: KeptRun) -> Shown:
     return (
         "Errors and commands of (a), (b) and (c) in the same scale. The largest e_f grows as "
         f"{numbers(errors)} m; the largest command is {numbers(peaks)} N, soon after the start.",
-        overlay("", runs),
+        one_figure("overlay", "", runs),
     )
 
 
@@ -148,7 +148,11 @@ def jacobian(full: KeptRun, printed: KeptRun) -> Shown:
         f"{numbers(full.metrics['final_error'])} m (reading 3). The vehicle tumbles on its way "
         "with (11) as printed; the large errors on the way drive theta_hat up, and with it the "
         "accuracy at the end, as a smaller eps_t would.",
-        overlay("", [Drawn("full attitude", full.table), Drawn("(11) as printed", printed.table)]),
+        one_figure(
+            "overlay",
+            "",
+            [Drawn("full attitude", full.table), Drawn("(11) as printed", printed.table)],
+        ),
     )
 
 
@@ -279,7 +283,7 @@ def saturation(tanh: KeptRun, algebraic: KeptRun) -> Shown:
     return (
         f"Fig. 4 without noise. L2 effort {' against '.join(efforts)}; "
         f"e_f {errors[0]} m against {errors[1]} m.",
-        overlay("", [Drawn("tanh", tanh.table), Drawn("algebraic", algebraic.table)]),
+        one_figure("overlay", "", [Drawn("tanh", tanh.table), Drawn("algebraic", algebraic.table)]),
     )
 
 

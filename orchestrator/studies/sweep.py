@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.cosim import LOOPS, LoopName, System
-from orchestrator.figures.study_values import FigureEntry
+from orchestrator.figures.study_values import FigureEntry, Values
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import PACKAGES
@@ -187,17 +187,8 @@ def complete_study(
         # All figures or, where one of them cannot be written, none.
         with kept.ledger.changing() as unfinished:
             legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
-            notes = list(
-                draw_figures(
-                    entries,
-                    study.title,
-                    result,
-                    unfinished,
-                    legends,
-                    space.units,
-                    space.logarithmic,
-                )
-            )
+            runs = Values(result, legends=legends, units=space.units, logarithmic=space.logarithmic)
+            notes = list(draw_figures(entries, study.title, runs, unfinished))
         for note in notes:
             say(note)
     return result

@@ -31,8 +31,7 @@ from orchestrator.cosim import (
     Value,
     write_ssp,
 )
-from orchestrator.figures.drawing import compose
-from orchestrator.figures.plot import plot
+from orchestrator.figures.drawing import compose, plot
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.runs.result import read_result
 from orchestrator.runs.wiring import closed_loop
