@@ -20,8 +20,8 @@ from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.scenario import names
 from orchestrator.studies.space import Space
-from orchestrator.studies.study_file import read_figures, read_study
-from orchestrator.studies.study_result import StudyResult
+from orchestrator.studies.store import StudyResult
+from orchestrator.studies.study import read_figures, read_study
 from pages import DOCS
 from parts.gallery import PICTURES
 

@@ -18,7 +18,7 @@ from orchestrator.figures.study_figures import (
     pareto_front,
 )
 from orchestrator.figures.study_values import Values
-from orchestrator.studies.study_file import read_figures
+from orchestrator.studies.study import read_figures
 from orchestrator.vehicle.indices import index_columns
 from support.machine import contents
 

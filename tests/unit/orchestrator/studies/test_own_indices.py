@@ -13,7 +13,7 @@ from orchestrator.figures.study_values import Values
 from orchestrator.machine.errors import InputError, Refused
 from orchestrator.studies.engine import Point
 from orchestrator.studies.own_indices import OwnIndex, read_own_index, with_fields
-from orchestrator.studies.study_file import read_study
+from orchestrator.studies.study import read_study
 from orchestrator.studies.sweep import Means, prepare_study
 
 #: The last time at which the depth is further than this from its reference [m].

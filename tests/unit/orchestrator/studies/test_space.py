@@ -16,8 +16,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import MOST_RUNS
-from orchestrator.studies.study_file import study_of
+from orchestrator.studies.study import MOST_RUNS, study_of
 
 qmc = pytest.importorskip("scipy.stats.qmc", reason="needs the extra `studies`")
 

@@ -15,8 +15,7 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.studies.engine import Outcome
-from orchestrator.studies.store import open_store
-from orchestrator.studies.study_result import StudyResult, read_study_record
+from orchestrator.studies.store import StudyResult, open_store, read_study_record
 from orchestrator.vehicle.indices import index_columns
 from support.machine import contents, eventually
 

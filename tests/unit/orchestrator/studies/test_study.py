@@ -7,8 +7,16 @@ import pytest
 from orchestrator.machine.errors import InputError, Refused
 from orchestrator.runs.loading import load_scenario
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import BATCH, Range, Sample, StopTime, ready_studies
-from orchestrator.studies.study_file import read_figures, read_study, study_of
+from orchestrator.studies.study import (
+    BATCH,
+    Range,
+    Sample,
+    StopTime,
+    read_figures,
+    read_study,
+    ready_studies,
+    study_of,
+)
 
 TEXT = """
 scenario = ["fig5", "other.ssp"]
