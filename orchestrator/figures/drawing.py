@@ -272,42 +272,32 @@ def draw(
     notes: list[str] = []
     loops = runs[0].loops
     for key, vehicle, drawn in figures_of(kind, loops):
-        shown, name = list(runs), title
+        shown, text = list(runs), title
         if len(drawn) < len(loops):
             [loop] = drawn
             shown = _with_vehicle(runs, loop)
-            name = ", ".join(filter(None, (title, loop.name if title else "")))
-        notes += _draw_files(key, name, shown, folder, f"{stem}{vehicle}", stop)
-    if len(loops) > MOST_DRAWN:
-        notes.append(f"no figure of each of {len(loops)} vehicles, only of all together")
-    return notes
-
-
-def _draw_files(
-    kind: str,
-    title: str,
-    runs: Sequence[Drawn],
-    folder: Path,
-    stem: str,
-    stop: Callable[[], bool],
-) -> list[str]:
-    """Draw the figures of one vehicle, or of all together; return notes on what was left out."""
-    notes: list[str] = []
-    bar = tqdm(FIGURES[kind].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
-    for suffix, rows in bar:
-        if stop():
-            break
-        figure, left_out = compose(title, rows, runs)
-        if figure is not None:
+            text = f"{title}, {loop.name}" if title and loop.name else title
+        files = FIGURES[key].items()
+        for suffix, rows in tqdm(files, "drawing", delay=_PATIENCE, disable=None, leave=False):
+            if stop():
+                break
+            name = f"{stem}{vehicle}{suffix}"
+            figure, left_out = compose(text, rows, shown)
+            if figure is None:
+                missing = f"the run has no {left_out[0]}"
+                notes.append(
+                    f"figure {name} left out: {missing}" if suffix else f"no figure: {missing}"
+                )
+                if not suffix:
+                    break
+                continue
             try:
-                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FIGURE_FORMATS))
+                save(figure, *(folder / f"{name}.{ending}" for ending in FIGURE_FORMATS))
                 notes += left_out
             except InputError as error:
-                notes.append(f"figure {stem}{suffix} left out: {error}")
-        elif not suffix:
-            return [f"no figure: the run has no {left_out[0]}"]
-        else:
-            notes.append(f"figure {stem}{suffix} left out: the run has no {left_out[0]}")
+                notes.append(f"figure {name} left out: {error}")
+    if len(loops) > MOST_DRAWN:
+        notes.append(f"no figure of each of {len(loops)} vehicles, only of all together")
     return notes
 
 
