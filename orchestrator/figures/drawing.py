@@ -252,7 +252,7 @@ def draw(
     stem: str,
     stop: Callable[[], bool] = lambda: False,
 ) -> list[str]:
-    """Draw the figures of a scenario as PNG and SVG, as far as the runs have what they show.
+    """Draw the figures of a scenario as PNG and SVG, with the panels for which there are signals.
 
     Several vehicles have one figure together. Each of up to :data:`MOST_DRAWN` has its own as well,
     with the vehicle of the same name in the other runs.
@@ -408,7 +408,7 @@ def _draw_group(
 
 
 def _group_of(column: str) -> str:
-    """Return the group of a column, plant.y of plant.y.x, or a column that has none itself."""
+    """Return the group of a column: plant.y of plant.y.x, but a of a."""
     for separator in ("[", "."):
         group, _, member = column.rpartition(separator)
         if "." in group and member:

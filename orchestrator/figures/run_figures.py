@@ -625,7 +625,7 @@ SMALLEST_DISTANCE = Panel("smallest distance", _needs_distances, _smallest_dista
 _SURGE, _LINEAR, _ANGULAR = slice(1), slice(3), slice(3, None)
 
 #: Name of the figure of several vehicles together, and the number of vehicles up to which each
-#: has a figure of its own as well.
+#: also has a figure of its own.
 FLEET, MOST_DRAWN = "fleet", 10
 
 #: Figures by name: for each, its files' suffixes and the rows of panels in each file.

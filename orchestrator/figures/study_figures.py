@@ -52,8 +52,8 @@ _DARK, _NOTHING = 0.6, 0.05
 #: Largest number of lines or panels.
 _MOST_PARTS = 12
 
-#: Logarithmic axes: numbers at most, decades up to which there are ticks between them, and decades
-#: below which 3 has a number as well (below one decade 2 and 5).
+#: Logarithmic axes: numbers at most, decades up to which there are ticks between them, and
+#: decades below which also 3 has a number (below one decade 2 and 5).
 _TICKS, _SMALL_TICKS, _FEW = 6, 12, 2.5
 
 #: An axis is logarithmic if its values are positive and their quantile of this share is so many
@@ -319,7 +319,7 @@ def front(entry: FigureEntry, title: str, runs: Values) -> Figure:
 
 
 def pareto_front(points: np.ndarray) -> np.ndarray:
-    """Return those of points (n, 2) that no other point is below in both coordinates."""
+    """Return the points, of (n, 2), that no other point beats in both coordinates."""
     points = points[np.lexsort(points.T[::-1])]
     lowest = np.minimum.accumulate(np.append(np.inf, points[:, 1]))
     front: np.ndarray = points[points[:, 1] < lowest[:-1]]

@@ -124,7 +124,7 @@ class Values:
     logarithmic: Mapping[str, bool] = field(default_factory=dict)
 
     def __getitem__(self, value: str) -> np.ndarray:
-        """Return a value of each run, nan if a run has none."""
+        """Return a value of each run, or nan."""
         if value in VERDICTS:
             return VERDICTS[value][1](self.columns).astype(float)
         product: np.ndarray = reduce(np.multiply, map(self._factor, _factors(value)))
@@ -170,7 +170,7 @@ class Values:
         return replace(self, columns={name: column[rows] for name, column in self.columns.items()})
 
     def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Values]]:
-        """Yield the runs that agree in some columns, and a text that tells them from the others.
+        """Yield the runs that agree in some columns, each part with a text that distinguishes it.
 
         A run without a value in one of the columns differs from all that have one.
         """
@@ -193,7 +193,7 @@ class Values:
 
 
 def members(factor: str, columns: Columns | Sequence[str]) -> list[str]:
-    """Return the columns of a value that is no product; none if there is no such value."""
+    """Return the columns of a value that is not a product; none if there is no such value."""
     if _NORM.fullmatch(factor):
         names = names_of(factor)
         return names if all(name in columns for name in names) else []

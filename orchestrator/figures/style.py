@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 from orchestrator.cosim import Table
 from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 
-#: Okabe and Ito's colours, darkest first, which the colour-blind can tell apart; for print, every
-#: line has its own style as well.
+#: Okabe and Ito's colours, darkest first, which the colour-blind can distinguish. For print, every
+#: line also has its own style.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 STYLES = ("-", "--", "-.", ":")
 REFERENCE = "#555555"
@@ -21,10 +21,10 @@ REFERENCE = "#555555"
 #: Alternating lightnesses, and saturation, of vehicles beyond the colours above.
 _LIGHTNESSES, _SATURATION = (0.32, 0.6), 0.75
 
-#: Rings of a vehicle's hull: distance behind the nose and radius, in shares of its length.
+#: Rings of a vehicle's hull: distance from the nose and radius, in shares of its length.
 RINGS = ((0, 0), (0.02, 0.04), (0.08, 0.075), (0.18, 0.09), (0.7, 0.09), (0.9, 0.05), (1, 0.02))
 
-#: Corners of the upper fin: distance behind the nose, and height above the axis.
+#: Corners of the upper fin: distance from the nose, and height above the axis.
 FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
 
 #: Width of a figure [in]: two columns of a journal, and legible on a phone.

@@ -1,7 +1,7 @@
 """Blocks of runs: their sizes, the workers that make them, and their outcomes.
 
-Workers are processes of this machine, or threads if the engine releases Python's lock, or those of
-a Dask cluster (:mod:`.cluster`). If a worker dies, another one repeats its block.
+Workers are processes of this machine, threads if the engine releases Python's lock, or workers of a
+Dask cluster (:mod:`.cluster`). If a worker dies, another one repeats its block.
 """
 
 from __future__ import annotations

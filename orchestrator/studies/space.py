@@ -204,7 +204,7 @@ class Space:
 
 
 class _Names:
-    """The names that a study may use: the step, and those of at least one of its systems."""
+    """Names that a study may use: the step, and all names of at least one of its systems."""
 
     def __init__(self, systems: Sequence[System]) -> None:
         self._systems = systems
@@ -214,7 +214,7 @@ class _Names:
         return float if name == STEP else _TYPES[self._variable(name).family]
 
     def unit(self, name: str) -> str:
-        """Return the unit of a value; empty if it has none, or differs between systems."""
+        """Return the unit of a value; empty without a unit, or if systems have different ones."""
         if name == STEP:
             return "s"
         target = PortName.read(name)

@@ -243,7 +243,7 @@ class FigureTable(TomlTable):
 
 
 class FiguresTable(TomlTable):
-    """What is drawn: `[figures]`."""
+    """Figures: `[figures]`."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, FigureTable]
@@ -407,7 +407,7 @@ def _sample(where: str, content: Mapping[str, Any]) -> Sample:
 
 
 def _check_names(where: str, study: Study) -> None:
-    """Check the syntax of names, that each is stated once, and that those of stop_time vary."""
+    """Check the syntax of names, that none is stated twice, and that names of stop_time vary."""
     findings = Findings()
     for scenario in dict.fromkeys(study.scenario):
         if study.scenario.count(scenario) > 1:
@@ -490,7 +490,7 @@ def read_figures(
 def _check_figure(
     where: str, table: Mapping[str, Any], numbers: Sequence[str], columns: Sequence[str]
 ) -> None:
-    """Check that a figure uses `numbers` as values, and `columns` to tell runs apart."""
+    """Check that a figure uses `numbers` as values, and `columns` to distinguish runs."""
     for key in ("x", "y", "show", "limits"):
         for value in listed(table.get(key, ())):
             if not is_known(value, numbers):

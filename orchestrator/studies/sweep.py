@@ -43,7 +43,7 @@ from orchestrator.studies.study import (
     study_of,
 )
 
-#: Packages that studies need, besides those of runs.
+#: Packages that studies need in addition to runs.
 _NEEDED = ("pyarrow", "scipy")
 
 #: Packages whose versions are recorded.

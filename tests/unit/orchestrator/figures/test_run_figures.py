@@ -165,7 +165,7 @@ def test_long_names_leave_the_panels_their_room(kind, n):
 
 
 def test_a_figure_of_one_run_names_no_others():
-    """Its colours are those of signals."""
+    """Its colours distinguish signals."""
     runs = [Drawn(name, loop_table()) for name in "ab"]
     figure, _ = compose("Fig. 4", FIGURES["tracking"]["-velocity"], runs)
     assert figure.legends == []

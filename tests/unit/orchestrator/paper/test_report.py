@@ -163,7 +163,7 @@ def test_a_section_has_its_numbers_with_units_and_its_command(tmp_path):
     assert "- `controller.eps_t = 1.0`: as in Fig. 4; the paper names none" in text
 
 
-def test_every_entry_of_ours_is_listed(tmp_path):
+def test_entries_of_the_table_ours_are_listed(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text('[wires]\n"a.b" = "c.d"\n[ours]\nwires = "w"\nlegend = "l"\nx.y = "z"\n')
     [section] = sections([str(file)])
@@ -191,7 +191,7 @@ def test_a_run_without_rows_has_no_figure(tmp_path):
 
 
 @pytest.mark.parametrize("name", names())
-def test_an_entry_of_ours_names_a_value_of_the_file_and_has_a_reason(name):
+def test_entries_of_the_table_ours_are_values_with_reasons(name):
     scenario = read_scenario(name)
     assert scenario.remark
     for entry, why in scenario.ours.items():
