@@ -84,9 +84,6 @@ class Finding(NamedTuple):
     ours: str
     verdict: str
 
-    ours: str
-    verdict: str
-
 
 @dataclass(frozen=True)
 class Claim:

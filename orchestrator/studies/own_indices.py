@@ -129,10 +129,10 @@ def own_indices(study: Study, systems: Mapping[str, System]) -> tuple[OwnIndex, 
         name.partition(".")[0] for system in systems.values() for name in system.components
     }
     stems = {
-        stem[0]: None
+        match[0]: None
         for name in names
         for prefix in prefixes
-        if name.startswith(prefix) and (stem := _STEM.match(name, len(prefix)))
+        if name.startswith(prefix) and (match := _STEM.match(name, len(prefix)))
     }
     findings, every = Findings(), list[OwnIndex]()
     for stem in stems:
