@@ -12,9 +12,10 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from orchestrator.figures.style import heading, printed_unit
+from orchestrator.vehicle import indices
 from orchestrator.vehicle.distances import SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL
 from orchestrator.vehicle.index.tracking import REACHED
-from orchestrator.vehicle.indices import INDICES, Index
+from orchestrator.vehicle.indices import Index
 
 #: Columns of runs.parquet as arrays; a missing value is nan or None.
 Columns: TypeAlias = Mapping[str, np.ndarray]
@@ -60,12 +61,12 @@ class FigureEntry:
 
 def _index_of(value: str) -> tuple[Index, str, str] | None:
     """Return the index, the member and the vehicle of a column or group; None for another value."""
-    names = "|".join(index.name for index in INDICES)
+    names = "|".join(index.name for index in indices.INDICES)
     match = re.fullmatch(rf"(?:(.+)\.)?({names})(?:\.(\w+)|\[(\d+)\])?", value)
     if match is None:
         return None
     vehicle, name, *member = match.groups()
-    [index] = (index for index in INDICES if index.name == name)
+    [index] = (index for index in indices.INDICES if index.name == name)
     return index, next(filter(None, member), ""), vehicle or ""
 
 
