@@ -230,7 +230,7 @@ def one_figure(name: str, title: str, runs: Sequence[Drawn], vehicle: str = "") 
 
 
 def _with_vehicle(runs: Sequence[Drawn], loop: Loop) -> list[Drawn]:
-    """Return runs with one loop each: of the same name as a loop of the first run, else number."""
+    """Return runs with one loop each: that of the same name as `loop`, else of the same number."""
     i = runs[0].loops.index(loop)
     return [
         run._replace(
@@ -254,7 +254,7 @@ def draw(
 ) -> list[str]:
     """Draw the figures of a scenario as PNG and SVG, with the panels for which there are signals.
 
-    Several vehicles have one figure together. Each of up to :data:`MOST_DRAWN` has its own as well,
+    Several vehicles have one figure together. Each of up to :data:`.MOST_DRAWN` also has its own,
     with the vehicle of the same name in the other runs.
 
     Args:
@@ -408,7 +408,7 @@ def _draw_group(
 
 
 def _group_of(column: str) -> str:
-    """Return the group of a column: plant.y of plant.y.x, but a of a."""
+    """Return the group of a column, such as plant.y of plant.y.x, or a column without a group."""
     for separator in ("[", "."):
         group, _, member = column.rpartition(separator)
         if "." in group and member:

@@ -218,7 +218,7 @@ def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
 
 
 def _axes_from_above(cell: Cell, z_up: bool) -> Any:
-    """Return axes with x upwards, and y as in :func:`.earth_axes`, of equal scale."""
+    """Return axes of equal scale with x upwards and y as in :func:`.earth_axes`."""
     x, y, _ = earth_axes(z_up)
     axes = cell.axes(xlabel=y, ylabel=x)
     axes.set_aspect("equal", adjustable="datalim")
@@ -394,7 +394,7 @@ def draw_commands(
 
 
 def _command(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
-    """Return times and values of a command, which the last row holds until the end of the run."""
+    """Return times and values of a command; the last value is held until the end of the run."""
     command = table.step_values(column)[:, 0]
     return np.append(table.step_start, table.time[-1]), np.append(command, command[-1])
 

@@ -165,7 +165,7 @@ class Approach(NamedTuple):
         return (self.least_effort / effort) ** 2 / h
 
     def soonest(self, effort: float) -> float:
-        """Return the least time [s] in which a force of some L2 norm can have this impulse."""
+        """Return the least time [s] in which a force with an L2 norm [N.s^0.5] has this impulse."""
         return (self.impulse / effort) ** 2
 
 
