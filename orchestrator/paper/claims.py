@@ -414,8 +414,8 @@ def pd_chatters(five: KeptRun, pd: KeptRun) -> Finding:
 def pd_chatters_with_noise(*runs: KeptRun) -> Finding:
     variations = np.array([run.metrics["total_variation"] for run in runs])
     proposed, baseline = np.median(variations.reshape(2, len(_SEEDS), -1), axis=1).tolist()
-    found = _rougher(baseline, proposed)
-    return found._replace(ours=f"{found.ours}, medians of {len(_SEEDS)} draws")
+    finding = _rougher(baseline, proposed)
+    return finding._replace(ours=f"{finding.ours}, medians of {len(_SEEDS)} draws")
 
 
 def _rougher(rough: Sequence[float], smooth: Sequence[float]) -> Finding:
@@ -439,8 +439,8 @@ def pd_is_accurate(five: KeptRun, pd: KeptRun) -> Finding:
 @claim("Fig. 6: from 100 m the PD controller chatters severely", "severe chattering", SIX, SIX_PD)
 def pd_chatters_severely(six: KeptRun, pd: KeptRun) -> Finding:
     proposed, baseline = (total_variation_until(run.table, 60.0).tolist() for run in (six, pd))
-    found = _rougher(baseline, proposed)
-    return found._replace(ours=f"{found.ours} in the first 60 s")
+    finding = _rougher(baseline, proposed)
+    return finding._replace(ours=f"{finding.ours} in the first 60 s")
 
 
 @claim(
@@ -517,9 +517,9 @@ def gradual_degradation_on_the_way(*sevens: KeptRun) -> Finding:
 
 @claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "not stated")
 def gains_meet_the_conditions() -> Finding:
-    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
-    verdicts = [condition.verdict for condition in found.conditions]
-    first, second, _ = found.conditions
+    result = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
+    verdicts = [condition.verdict for condition in result.conditions]
+    first, second, _ = result.conditions
     return Finding(
         f"{', '.join(verdicts)}: (30) {first.left:g}, needed above {first.right:g}; (31) "
         f"{second.left:g}, needed above {second.right + second.least:.4g}",
@@ -532,11 +532,11 @@ def gains_meet_the_conditions() -> Finding:
     "arbitrarily large",
 )
 def region_is_arbitrarily_large() -> Finding:
-    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
-    least, there = found.zeta_of_any_gains, found.bounds.lambda_d2
+    result = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
+    least, lambda_d2 = result.zeta_of_any_gains, result.bounds.lambda_d2
     return Finding(
         f"as printed, (31) asks with any gains for more than {least:.4g} of lambda_d2, which is "
-        f"{there:g}; (42) holds for |x| < {found.x_of_any_gains:.2g} at most",
-        f"{_verdict(least < there)}: no gain enters alpha_3 with a positive sign "
+        f"{lambda_d2:g}; (42) holds for |x| < {result.x_of_any_gains:.2g} at most",
+        f"{_verdict(least < lambda_d2)}: no gain enters alpha_3 with a positive sign "
         "([the proof](#the-region-of-attraction-does-not-grow-with-the-gains))",
     )

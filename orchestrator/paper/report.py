@@ -98,7 +98,7 @@ class Companion(Request):
 
 def make_runs(
     requests: Iterable[Request],
-    crew: Workers,
+    pool: Workers,
     stop_time: float | None = None,
     kind: KindName = AUTO,
 ) -> dict[Request, KeptRun]:
@@ -106,7 +106,7 @@ def make_runs(
 
     Args:
         requests: of the runs.
-        crew: that makes them.
+        pool: that makes them.
         stop_time: of all runs [s]; None: their own.
         kind: of the bundle's FMUs in all runs.
 
@@ -135,7 +135,7 @@ def make_runs(
         labels[key] = min(label, labels.get(key, label), key=len)
     longest_first = sorted(wanted.items(), key=lambda item: -item[1][0])
     tasks = {key: partial(_make, asked) for key, (_, asked) in longest_first}
-    runs |= crew.results(tasks, "run")
+    runs |= pool.results(tasks, "run")
     named = {key: replace(runs[key], label=label) for key, label in labels.items()}
     return {request: named[key] for request, key in keys.items()}
 
@@ -335,9 +335,9 @@ def write_report(
     requests += [request for claim in CLAIMS for request in claim.runs]
     requests += [request for effect in EFFECTS for request in effect.runs]
     with replace_files(folder, (*_NAMES, RECORD), force=force) as unfinished:
-        with workers() as crew:
-            runs = make_runs(requests, crew, stop_time, kind)
-            notes, effects = _draw(chapters, runs, unfinished, crew)
+        with workers() as pool:
+            runs = make_runs(requests, pool, stop_time, kind)
+            notes, effects = _draw(chapters, runs, unfinished, pool)
         labels = list(dict.fromkeys(f"auv-fmu run {run.label}" for run in runs.values()))
         parts = [
             "## Every printed number and claim",
@@ -382,7 +382,7 @@ def write_report(
 
 
 def _draw(
-    chapters: Sequence[Section], runs: Mapping[Request, KeptRun], folder: Path, crew: Workers
+    chapters: Sequence[Section], runs: Mapping[Request, KeptRun], folder: Path, pool: Workers
 ) -> tuple[dict[str, list[str]], dict[str, str]]:
     """Draw all figures; return the notes of the sections, and the texts of the effects."""
     figures = folder / _FIGURES
@@ -396,7 +396,7 @@ def _draw(
     for effect in EFFECTS:
         made = [runs[request] for request in effect.runs]
         tasks["effect", effect.name] = partial(show_effect, effect.name, made, figures)
-    results = dict(crew.results(tasks, "figure"))
+    results = dict(pool.results(tasks, "figure"))
     notes = {section.name: results["section", section.name] for section in chapters}
     return notes, {effect.name: results["effect", effect.name] for effect in EFFECTS}
 
