@@ -31,8 +31,7 @@ from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.engine import Engine, FmuEngine, Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import ready_studies
-from orchestrator.studies.study_file import read_study
+from orchestrator.studies.study import read_study, ready_studies
 
 #: Runs that are timed: noise is drawn in the first, and three vehicles are in the last.
 _SCENARIOS = ("fig4", "fig5", "fig5-pd", "path", "sea", "remus", "formation-v")

@@ -31,7 +31,7 @@ from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import open_store
-from orchestrator.studies.study_file import study_of
+from orchestrator.studies.study import study_of
 from orchestrator.studies.sweep import making_runs
 from orchestrator.vehicle.indices import index_columns
 

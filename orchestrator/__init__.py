@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from orchestrator.runs.preparation import load
     from orchestrator.runs.result import Result, read
     from orchestrator.runs.run import simulate
-    from orchestrator.studies.study_result import StudyResult
+    from orchestrator.studies.store import StudyResult
     from orchestrator.studies.sweep import sweep
 
 __all__ = ["Result", "StudyResult", "load", "read", "simulate", "sweep"]
@@ -45,7 +45,7 @@ __getattr__, __dir__ = offered(
         "runs.preparation": "load",
         "runs.result": "Result read",
         "runs.run": "simulate",
-        "studies.study_result": "StudyResult",
+        "studies.store": "StudyResult",
         "studies.sweep": "sweep",
     },
 )

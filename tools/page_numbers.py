@@ -55,8 +55,8 @@ from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import Point
-from orchestrator.studies.study_file import read_study
-from orchestrator.studies.study_result import StudyResult
+from orchestrator.studies.store import StudyResult
+from orchestrator.studies.study import read_study
 from orchestrator.vehicle.indices import SMALLEST_DISTANCE_LABEL, smallest_distances
 from orchestrator.vehicle.signals import (
     ACTUATORS,

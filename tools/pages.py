@@ -45,8 +45,7 @@ from orchestrator.runs.scenario_file import (
     ScenarioFile,
 )
 from orchestrator.runs.wiring import read_wiring
-from orchestrator.studies.study import Study, ready_studies
-from orchestrator.studies.study_file import FigureTable, StudyFile, read_study
+from orchestrator.studies.study import FigureTable, Study, StudyFile, read_study, ready_studies
 from orchestrator.vehicle.indices import INDICES, Index
 from orchestrator.vehicle.proof import stated
 from parts.command_line import command_line

@@ -15,12 +15,13 @@ from PIL import Image
 
 from orchestrator.commands.main import main as auv_fmu
 from orchestrator.figures.study_figures import draw_figures
+from orchestrator.figures.study_values import Values
 from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import names
 from orchestrator.studies.space import Space
-from orchestrator.studies.study_file import read_figures, read_study
-from orchestrator.studies.study_result import StudyResult
+from orchestrator.studies.store import StudyResult
+from orchestrator.studies.study import read_figures, read_study
 from pages import DOCS
 from parts.gallery import PICTURES
 
@@ -55,11 +56,8 @@ def main() -> None:
                 draw_figures(
                     entries,
                     study.title,
-                    result,
+                    Values(result, {}, legends, space.units, space.logarithmic),
                     Path(drawn),
-                    legends,
-                    space.units,
-                    space.logarithmic,
                 )
             )
             for file in sorted(Path(drawn).glob("*.png")):

@@ -19,7 +19,6 @@ from orchestrator.machine.user_files import unpack
 from orchestrator.runs.preparation import FALLBACK_STOP_TIME, load_scenario, outdated, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import impossible_paths
-from orchestrator.studies.study import is_study
 
 #: Surprises for the user of an FMU, by a flag of its description and its surprising value.
 _SURPRISES = {
@@ -56,7 +55,7 @@ def _check(options: argparse.Namespace) -> int:
     elif options.file.endswith(".fmu"):
         look = _fmu
     else:
-        look = _study if is_study(options.file) else _system
+        look = _study if _is_study(options.file) else _system
     remarks = look(options, findings)
     for kind, texts in (
         ("problem", findings.problems),
@@ -83,11 +82,18 @@ def _is_own(path: Path) -> bool:
     return path.suffix == ".py" or (path / f"{path.resolve().name}.py").is_file()
 
 
+def _is_study(file: str) -> bool:
+    if not file.endswith(".toml"):
+        return False
+    from orchestrator.studies.study import is_study  # noqa: PLC0415
+
+    return is_study(Path(file))
+
+
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
     """Check a study as `sweep` does before its first run; returns remarks."""
     # Their import takes half a second.
-    from orchestrator.studies.study import SOBOL  # noqa: PLC0415
-    from orchestrator.studies.study_file import read_study  # noqa: PLC0415
+    from orchestrator.studies.study import SOBOL, read_study  # noqa: PLC0415
     from orchestrator.studies.sweep import Means, check_installed, prepare_study  # noqa: PLC0415
 
     with findings.collecting():

@@ -18,9 +18,8 @@ from orchestrator.commands.options import (
 )
 from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.cosim import Observer
-from orchestrator.figures.drawing import save
+from orchestrator.figures.drawing import plot, save, told_apart, wanted_columns
 from orchestrator.figures.film import Film, animate
-from orchestrator.figures.plot import plot, told_apart, wanted_columns
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError

@@ -11,8 +11,7 @@ from orchestrator.commands.streams import INTERRUPTED, OK, describe, say, show
 from orchestrator.paper.report import write_report
 from orchestrator.runs.request import Files, Request
 from orchestrator.runs.scenario import names
-from orchestrator.studies.study import ready_studies
-from orchestrator.studies.study_file import read_study
+from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.studies.sweep import Means, complete_study, study_folder
 from orchestrator.vehicle.cautions import CAUTIONS
 

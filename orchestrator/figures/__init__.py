@@ -1,1 +1,1 @@
-"""Figures of runs and of studies, as far as there is what they show."""
+"""Figures of runs and of studies."""

@@ -1,6 +1,7 @@
-"""Figures drawn by matplotlib, with our settings and nobody else's, into files without a date.
+"""Figures of runs, drawn by matplotlib: those that scenarios name, and plots of any signals.
 
-What only looks a figure up imports :mod:`.run_figures`: matplotlib takes as long as all the rest.
+Settings are :data:`.SETTINGS`, whatever a matplotlibrc contains, and files contain no date. Code
+that only looks figures up imports :mod:`.run_figures`, which needs no matplotlib.
 """
 
 from __future__ import annotations
@@ -8,8 +9,9 @@ from __future__ import annotations
 import logging
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from io import BytesIO
 from itertools import cycle
 from math import lcm
@@ -17,44 +19,66 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from tqdm import tqdm
 
-from orchestrator.figures.event_marks import list_events
-from orchestrator.figures.panels import Cell, Panel, Rows, run_line
-from orchestrator.figures.run_figures import FIGURES, MOST_DRAWN, figures_of
+from orchestrator.cosim import Table
+from orchestrator.figures.run_figures import (
+    FIGURES,
+    MOST_DRAWN,
+    Cell,
+    Panel,
+    Rows,
+    figures_of,
+    list_events,
+    over_time,
+    run_line,
+)
 from orchestrator.figures.style import (
     COLOURS,
     FIGURE_FORMATS,
     FIGURE_WIDTH,
     SETTINGS,
+    STYLES,
     Drawn,
     escape_math,
     heading,
+    printed_unit,
 )
+from orchestrator.figures.visible import draw_signal
 from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.texts import matches, matching
 from orchestrator.vehicle.signals import Loop
 
-#: What a file would say of its time and tool, by its ending.
+#: Metadata that would name the time or the tool, by the ending of the file.
 _NO_DATE: dict[str, Any] = {
     ".png": {"Software": None},
     ".svg": {"Date": None},
     ".pdf": {"CreationDate": None},
 }
 
-#: Room for a heading, and for a row of a legend [in].
-_HEADING, _ROW = 0.3, 0.2
+#: Heights of a heading and of a row of a legend, of a panel of a plot, and of the margins of a plot
+#: above and below its panels [in].
+_HEADING, _ROW, _PANEL, _MARGIN = 0.3, 0.2, 1.9, 0.6
 
-#: Letters in a row of a heading, and of a legend, of which the line of an entry takes some.
+#: Characters in a row of a heading, in a row of a legend, and as wide as the line of an entry.
 _HEADING_LETTERS, _LETTERS, _LINE = 74, 100, 6
 
-#: Seconds before a bar appears on a terminal.
+#: Seconds before a progress bar appears.
 _PATIENCE = 2.0
+
+#: Largest number of parameters, or of events, in the labels of runs.
+_FEW = 2
+
+#: Styles of lines of a plot: so many that few runs look alike.
+_STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
 
 
 class Plot(Figure):
-    """A figure that a notebook shows without a call."""
+    """A figure that a notebook shows by itself."""
 
     def _repr_png_(self) -> bytes:
         image = BytesIO()
@@ -64,10 +88,7 @@ class Plot(Figure):
 
 @contextmanager
 def styled() -> Iterator[None]:
-    """Draw with :data:`.SETTINGS` and nothing that a matplotlibrc says, wherever that may be.
-
-    What matplotlib thinks of it is not for the user.
-    """
+    """Draw with :data:`.SETTINGS` only, and without matplotlib's warnings."""
     log = logging.getLogger("matplotlib")
     level = log.level
     log.setLevel(logging.ERROR)
@@ -82,14 +103,14 @@ def styled() -> Iterator[None]:
 
 
 def save(figure: Figure, *paths: Path) -> None:
-    """Write a figure without the time and the tool, so that the same run gives the same file.
+    """Write a figure without time and tool, so that equal runs give equal files.
 
     Raises:
-        InputError: values are too large for its axes.
+        InputError: values are too large for the axes.
 
     """
     with styled(), mpl.rc_context({"figure.constrained_layout.use": False}):
-        # Laid out once for all files.
+        # One layout for all files.
         if (engine := figure.get_layout_engine()) is not None:
             try:
                 engine.execute(figure)
@@ -100,24 +121,19 @@ def save(figure: Figure, *paths: Path) -> None:
             figure.savefig(path, metadata=_NO_DATE[path.suffix])
 
 
-def legend_columns(lines: Sequence[Line2D]) -> int:
-    """How many entries of a legend have room beside each other."""
+# Legends
+
+
+def _legend_columns(lines: Sequence[Line2D]) -> int:
     longest = max(len(str(line.get_label())) for line in lines)
     return max(1, _LETTERS // (longest + _LINE))
 
 
-def name_lines(figure: Figure, lines: Sequence[Line2D], title: str = "") -> None:
-    """Say above all panels which line is which run, and make room for it.
-
-    Args:
-        figure: without a heading.
-        lines: one for each run.
-        title: heading; empty for none.
-
-    """
-    columns = legend_columns(lines)
+def _name_lines(figure: Figure, lines: Sequence[Line2D], title: str = "") -> None:
+    """Add a legend above all panels, with the heading in it, and make the figure higher for it."""
+    columns = _legend_columns(lines)
     figure.set_figheight(figure.get_figheight() + _ROW * -(-len(lines) // columns))
-    # A heading by itself would lie upon the legend.
+    # A separate heading would overlap the legend.
     legend = figure.legend(
         handles=lines, loc="outside upper center", ncols=columns, title_fontsize="large",
         title=heading(textwrap.fill(title, _HEADING_LETTERS)),
@@ -126,25 +142,28 @@ def name_lines(figure: Figure, lines: Sequence[Line2D], title: str = "") -> None
 
 
 def name_runs(figure: Figure, runs: Sequence[Drawn], title: str = "") -> None:
-    """Name several runs by the lines that they have in panels: see :func:`name_lines`."""
+    """Add a legend of runs, with the lines that they have in panels, and a heading."""
     colours = enumerate(zip(runs, cycle(COLOURS), strict=False))
     lines = [
         Line2D([], [], **run_line(i, colour), label=escape_math(run.label))
         for i, (run, colour) in colours
     ]
-    name_lines(figure, lines, title)
+    _name_lines(figure, lines, title)
+
+
+# Figures that scenarios name
 
 
 def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | None, list[str]]:
-    """A figure of all that can be drawn.
+    """Draw the panels of a figure for which there are signals.
 
     Args:
         title: heading; empty for none.
         rows: of the figure.
-        runs: the first is the one the figure is about.
+        runs: the subject of the figure first.
 
     Returns:
-        The figure, and what was left out of it, and why; or None, and what is missing.
+        The figure, and a note on each panel that was left out; or None, and what is missing.
 
     """
     runs = [run for run in runs if len(run.result) > 1]
@@ -173,60 +192,56 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
 
 
 def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
-    """What a panel does not show, and why."""
+    """Return notes on the runs that a panel does not show."""
     missing = {run.label: run.lacks(panel.needs) for run in runs}
+    note = f"panel {panel.name!r} left out"
     if all(missing.values()):
-        return [f"{panel.name} skipped: no {missing[runs[0].label][0]}"]
+        return [f"{note}: the run has no {missing[runs[0].label][0]}"]
     return [
-        f"{panel.name} of {label} skipped: no {names[0]}"
-        for label, names in missing.items()
-        if names
+        f"{note} for {label}, which has no {names[0]}" for label, names in missing.items() if names
     ]
 
 
 def one_figure(name: str, title: str, runs: Sequence[Drawn], vehicle: str = "") -> Figure:
-    """One figure by its name.
+    """Draw one figure.
 
     Args:
-        name: key of :data:`FIGURES`, with what the name of the figure's file ends with.
+        name: key of :data:`FIGURES`, with the suffix of the figure's file.
         title: heading; empty for none.
-        runs: the first is the one the figure is about.
-        vehicle: that is shown; empty: the first.
+        runs: the subject of the figure first, with labels that differ.
+        vehicle: to show; empty for the first.
 
     Raises:
         InputError: there is no such figure or vehicle, or the runs have nothing that it shows.
 
     """
-    known = {f"{key}{end}": rows for key, of in FIGURES.items() for end, rows in of.items()}
+    known = {f"{key}{end}": rows for key, files in FIGURES.items() for end, rows in files.items()}
     if name not in known:
         hint = did_you_mean(name, known) or f"; there are {', '.join(known)}"
         raise InputError(f"no figure {name!r}{hint}")
-    loops = {loop.name: (i, loop) for i, loop in enumerate(runs[0].loops)}
+    loops = {loop.name: loop for loop in runs[0].loops}
     if vehicle and vehicle not in loops:
         raise InputError(f"no vehicle {vehicle!r}; there are {', '.join(loops)}")
-    i, loop = loops[vehicle] if vehicle else (0, runs[0].loop)
-    shown = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
-    figure, missing = compose(title, known[name], shown)
+    loop = loops[vehicle] if vehicle else runs[0].loop
+    figure, missing = compose(title, known[name], _with_vehicle(runs, loop))
     if figure is None:
         raise InputError(f"no figure: the run has no {missing[0]}")
     return figure
 
 
-def overlay(heading: str, runs: Sequence[Drawn]) -> Figure:
-    """Tracking errors and commands of several runs in the same panels.
-
-    Args:
-        heading: of the figure; empty for none.
-        runs: with labels that tell them apart.
-
-    Raises:
-        InputError: no run has anything to show.
-
-    """
-    figure, missing = compose(heading, FIGURES["overlay"][""], runs)
-    if figure is None:
-        raise InputError(f"no figure: the runs have no {missing[0]}")
-    return figure
+def _with_vehicle(runs: Sequence[Drawn], loop: Loop) -> list[Drawn]:
+    """Return runs with one loop each: that of the same name as `loop`, else of the same number."""
+    i = runs[0].loops.index(loop)
+    return [
+        run._replace(
+            loops=[
+                *(own for own in run.loops if own.name == loop.name),
+                *run.loops[i : i + 1],
+                *run.loops,
+            ][:1]
+        )
+        for run in runs
+    ]
 
 
 def draw(
@@ -237,67 +252,238 @@ def draw(
     stem: str,
     stop: Callable[[], bool] = lambda: False,
 ) -> list[str]:
-    """Draw the figures of a scenario, as PNG and SVG, as far as the runs have what they show.
+    """Draw the figures of a scenario as PNG and SVG, with the panels for which there are signals.
 
-    Several vehicles have one together. Each of a few has its own, with the vehicle of that name in
-    the other runs.
+    Several vehicles have one figure together. Each of up to :data:`.MOST_DRAWN` also has its own,
+    with the vehicle of the same name in the other runs.
 
     Args:
         kind: key of :data:`FIGURES`.
-        title: heading; empty where there is one beside the figure.
+        title: heading; empty if there is one next to the figure.
         runs: the run of the scenario, and those it is compared with.
         folder: to write into.
         stem: of the file names.
-        stop: asked before each figure whether to leave it out.
+        stop: called before each figure; true to leave out the rest.
 
     Returns:
-        What was left out, and why.
+        Notes on what was left out.
 
     """
     notes: list[str] = []
     loops = runs[0].loops
     for key, vehicle, drawn in figures_of(kind, loops):
-        of_vehicles, name = list(runs), title
+        shown, text = list(runs), title
         if len(drawn) < len(loops):
             [loop] = drawn
-            i = loops.index(loop)
-            of_vehicles = [run._replace(loops=[_same(run, loop, i)]) for run in runs]
-            name = ", ".join(filter(None, (title, loop.name if title else "")))
-        notes += _drawn(key, name, of_vehicles, folder, f"{stem}{vehicle}", stop)
+            shown = _with_vehicle(runs, loop)
+            text = f"{title}, {loop.name}" if title and loop.name else title
+        files = FIGURES[key].items()
+        for suffix, rows in tqdm(files, "drawing", delay=_PATIENCE, disable=None, leave=False):
+            if stop():
+                break
+            name = f"{stem}{vehicle}{suffix}"
+            figure, left_out = compose(text, rows, shown)
+            if figure is None:
+                missing = f"the run has no {left_out[0]}"
+                notes.append(
+                    f"figure {name} left out: {missing}" if suffix else f"no figure: {missing}"
+                )
+                if not suffix:
+                    break
+                continue
+            try:
+                save(figure, *(folder / f"{name}.{ending}" for ending in FIGURE_FORMATS))
+                notes += left_out
+            except InputError as error:
+                notes.append(f"figure {name} left out: {error}")
     if len(loops) > MOST_DRAWN:
         notes.append(f"no figure of each of {len(loops)} vehicles, only of all together")
     return notes
 
 
-def _same(run: Drawn, loop: Loop, i: int) -> Loop:
-    """The loop of a run that is drawn beside another's: the one of the same vehicle."""
-    named = [own for own in run.loops if own.name == loop.name]
-    return next(iter([*named, *run.loops[i : i + 1], *run.loops]))
+# Plots of any signals
 
 
-def _drawn(
-    kind: str,
-    title: str,
-    runs: Sequence[Drawn],
-    folder: Path,
-    stem: str,
-    stop: Callable[[], bool],
+def wanted_columns(
+    columns: Sequence[str], loops: Sequence[Loop], patterns: Sequence[str]
 ) -> list[str]:
-    """Draw the figures of one vehicle, and say what was left out."""
-    notes: list[str] = []
-    bar = tqdm(FIGURES[kind].items(), desc="drawing", delay=_PATIENCE, disable=None, leave=False)
-    for suffix, rows in bar:
-        if stop():
-            break
-        figure, left_out = compose(title, rows, runs)
-        if figure is not None:
-            try:
-                save(figure, *(folder / f"{stem}{suffix}.{ending}" for ending in FIGURE_FORMATS))
-                notes += left_out
-            except InputError as error:
-                notes.append(f"{stem}{suffix} skipped: {error}")
-        elif not suffix:
-            return [f"no figure: the run has no {left_out[0]}"]
-        else:
-            notes.append(f"{stem}{suffix} skipped: no {left_out[0]}")
-    return notes
+    """Return the columns that match some patterns, or without any, the usual ones of each loop."""
+    patterns = patterns or [
+        group
+        for loop in loops
+        for group in (
+            f"{loop.controller}.e",
+            f"{loop.vehicle}.tau",
+            f"{loop.controller}.theta_hat",
+        )
+    ]
+    return [name for name in columns if any(matches(name, pattern) for pattern in patterns)]
+
+
+def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
+    """Draw columns over time: a panel for each group such as plant.y, with all runs in it.
+
+    Args:
+        runs: with labels that differ.
+        patterns: such as `plant.y.*`, or the name of a group or column; none: errors, commands
+            and estimates of the loops of all vehicles.
+
+    Raises:
+        InputError: a pattern matches no column.
+
+    """
+    if not all(isinstance(pattern, str) for pattern in patterns):
+        raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
+    names = list(dict.fromkeys(name for run in runs for name in run.result.header.numeric_columns))
+    if not patterns:
+        patterns = wanted_columns(names, [loop for run in runs for loop in run.loops], ())
+    if not patterns:
+        groups = dict.fromkeys(map(_group_of, names))
+        raise InputError(f"name the columns to draw; there are {', '.join(groups)}")
+    units = {name: unit for run in runs for name, unit in run.result.header.units.items()}
+    panels: dict[tuple[str, str], list[str]] = {}
+    for name in matching(names, patterns):
+        # The members of a vector share a panel, whatever their units.
+        unit = "" if name.endswith("]") else printed_unit(units.get(name, ""))
+        panels.setdefault((_group_of(name), unit), []).append(name)
+    with styled():
+        figure = Plot(figsize=(FIGURE_WIDTH, _MARGIN + _PANEL * len(panels)))
+        axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+        has_means = [
+            _draw_group(place, group, unit, members, runs)
+            for place, ((group, unit), members) in zip(axes, panels.items(), strict=True)
+        ]
+        over_time(list(axes), runs, any(has_means))
+        list_events(figure, runs)
+        if len(runs) > 1:
+            in_colour = all(len(members) == 1 for members in panels.values())
+            lines = [
+                _legend_line(run.label, COLOURS[i % len(COLOURS)] if in_colour else "black", i)
+                for i, run in enumerate(runs)
+            ]
+            _name_lines(figure, lines)
+    return figure
+
+
+def _draw_group(
+    axes: Axes, group: str, unit: str, members: Sequence[str], runs: Sequence[Drawn]
+) -> bool:
+    """Draw the members of a group; return true if there are means among the lines.
+
+    Members differ in colour, runs in style; runs of a single member in both. A title says which
+    runs have none of the members.
+    """
+    has_means = False
+    parts = [member.removeprefix(group).strip(".[]") for member in members]
+    for i, run in enumerate(runs):
+        for j, member in enumerate(members):
+            if member not in run.result:
+                continue
+            colour = (j if len(members) > 1 else i) % len(COLOURS)
+            has_means |= draw_signal(
+                axes,
+                run.result,
+                partial(_column, member),
+                color=COLOURS[colour],
+                linestyle=_style(i if len(runs) > 1 else j),
+                label=", ".join(
+                    [parts[j]] * (len(members) > 1) + [escape_math(run.label)] * (len(runs) > 1)
+                ),
+            )
+    lacking = [run.label for run in runs if not any(name in run.result for name in members)]
+    if lacking:
+        whose = escape_math(lacking[0]) if len(lacking) == 1 else f"{len(lacking)} of the runs"
+        axes.set_title(f"not in {whose}", loc="right", fontsize="small")
+    name = group if len(members) > 1 else members[0]
+    axes.set_ylabel(f"{name}\n[{unit}]" if unit else name)
+    if len(members) > 1:
+        lines = [
+            _legend_line(part, COLOURS[j % len(COLOURS)], 0 if len(runs) > 1 else j)
+            for j, part in enumerate(parts)
+        ]
+        axes.legend(
+            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_legend_columns(lines)
+        )
+    return has_means
+
+
+def _group_of(column: str) -> str:
+    """Return the group of a column, such as plant.y of plant.y.x, or a column without a group."""
+    for separator in ("[", "."):
+        group, _, member = column.rpartition(separator)
+        if "." in group and member:
+            return group
+    return column
+
+
+def _column(name: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    time, values = table.time, table[name].astype(float, copy=False)
+    if table.header.units.get(name) == "rad":
+        # An angle that wraps gets a gap: a line across the panel would look like motion.
+        wraps = 1 + np.flatnonzero(np.abs(np.diff(values)) > np.pi)
+        time, values = np.insert(time, wraps, np.nan), np.insert(values, wraps, np.nan)
+    return time, values
+
+
+def _legend_line(label: str, colour: str, style: int) -> Line2D:
+    return Line2D([], [], color=colour, linestyle=_style(style), label=escape_math(label))
+
+
+def _style(i: int) -> Any:
+    return _STYLES[i % len(_STYLES)]
+
+
+def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[Drawn]:
+    """Return runs with labels that differ.
+
+    The labels are the first of these that differ: their own, a few parameters, a few events, ends
+    of paths, numbers.
+
+    Args:
+        runs: to draw together.
+        paths: that they were read from.
+
+    """
+    names = [run.label for run in runs]
+    prefixes = [[name] * (len(set(names)) > 1) for name in names]
+    # As texts: a record does not tell where the component ends in the name of a parameter.
+    parameters = [
+        {str(name): value for name, value in run.result.header.parameters.items()} for run in runs
+    ]
+    differing = [
+        name
+        for name in dict.fromkeys(name for values in parameters for name in values)
+        if len({str(values.get(name)) for values in parameters}) > 1
+    ]
+    changes = [
+        ", ".join([*prefix, *(f"{name} = {_value_text(values, name)}" for name in differing)])
+        for prefix, values in zip(prefixes, parameters, strict=True)
+    ]
+    happened = [
+        [
+            f"{event.label} at {event.time:.5g} s"
+            for event in run.result.ending.events
+            if event.label
+        ]
+        for run in runs
+    ]
+    events = [
+        ", ".join([*prefix, *(of_run or ["no event"])])
+        for prefix, of_run in zip(prefixes, happened, strict=True)
+    ]
+    parts = [path.resolve().parts for path in paths]
+    longest = max(map(len, parts), default=1)
+    candidates = [
+        names,
+        *([changes] * (len(differing) <= _FEW)),
+        *([events] * (max(map(len, happened)) <= _FEW)),
+        *(["/".join(part[-n:]) for part in parts] for n in range(1, longest)),
+        [f"{name} ({number})" for number, name in enumerate(names, start=1)],
+    ]
+    labels = next(labels for labels in candidates if len(set(labels)) == len(labels))
+    return [run._replace(label=label) for run, label in zip(runs, labels, strict=True)]
+
+
+def _value_text(values: Mapping[str, Any], name: str) -> str:
+    value = values.get(name, "none")
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,4 +1,4 @@
-"""A film of a run: its vehicles in space, beside them signals over time."""
+"""A film of a run: its vehicles in space, and next to them signals over time."""
 
 from __future__ import annotations
 
@@ -18,10 +18,15 @@ from PIL import Image
 
 from auv_fmu.paper.attitude import rotation_from_euler
 from orchestrator.figures.drawing import styled
-from orchestrator.figures.event_marks import list_events
-from orchestrator.figures.fleet_panels import ERRORS, SMALLEST_DISTANCE
-from orchestrator.figures.panels import COMMANDS, Cell, frame_path
-from orchestrator.figures.run_figures import ALL_ERRORS
+from orchestrator.figures.run_figures import (
+    ALL_ERRORS,
+    COMMANDS,
+    FLEET_ERRORS,
+    SMALLEST_DISTANCE,
+    Cell,
+    frame_path,
+    list_events,
+)
 from orchestrator.figures.style import (
     COLOURS,
     FIN,
@@ -35,38 +40,39 @@ from orchestrator.figures.style import (
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import real_parameter, true_control_point
 
-#: Sides of the hull.
+#: Number of sides of the hull.
 _SIDES = 12
 
-#: Colours of the hull of a single vehicle, of the upper fin, which shows the roll, and of the rest.
+#: Colours of the hull of a single vehicle, of the upper fin (it shows the roll) and of other fins.
 _HULL, _UPPER, _OTHER = COLOURS[5], COLOURS[0], REFERENCE
 
-#: Edges of its faces.
+#: Edges of the faces of the hull.
 _EDGES: Any = {"edgecolors": "#333333", "linewidths": 0.2}
 
-#: Length of the drawn vehicle: a share of the largest extent of the paths, and at least times ell.
+#: Length of the drawn vehicle: a share of the largest extent of the paths, but at least this
+#: multiple of ell.
 _SHARE, _LENGTH = 0.2, 2.0
 
-#: Points that a path is drawn through, at most; and of more vehicles than this none is named.
+#: Largest number of points of a drawn path, and of vehicles that are named.
 _POINTS, _MOST_NAMED = 2000, 12
 
-#: Panels beside the scene, each with its share of the height: of one vehicle, and of several.
-_PANELS = {False: {ALL_ERRORS: 1, COMMANDS: 3}, True: {ERRORS: 1, SMALLEST_DISTANCE: 1}}
+#: Panels next to the scene with their shares of the height, for one vehicle and for several.
+_PANELS = {False: {ALL_ERRORS: 1, COMMANDS: 3}, True: {FLEET_ERRORS: 1, SMALLEST_DISTANCE: 1}}
 
-#: Length of a film whose speed is not given [s], and pixels in an inch of its figure.
+#: Length of a film without a given speed [s], and pixels per inch of its figure.
 _DURATION, _DPI = 10.0, 90
 
-#: Least and largest width and height [px].
+#: Smallest and largest width and height [px].
 _SIZES = 200, 4000
 
 
 class Film(NamedTuple):
-    """How a run is filmed.
+    """Options of a film.
 
     Attributes:
         fps: frames per second.
         size: width and height [px].
-        speed: seconds of the run in a second of the film; None: the film lasts 10 s.
+        speed: seconds of the run per second of the film; None: the film lasts 10 s.
 
     """
 
@@ -75,12 +81,7 @@ class Film(NamedTuple):
     speed: float | None = None
 
     def check(self, path: Path) -> None:
-        """Check before a run that its film can be written.
-
-        Raises:
-            InputError: the format is unknown or not available, or a number is out of bounds.
-
-        """
+        """Raise an InputError if a film with these options cannot be written to a path."""
         if path.suffix not in (".gif", ".mp4"):
             raise InputError(f"{path}: must end with .gif or .mp4")
         if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
@@ -95,22 +96,22 @@ class Film(NamedTuple):
 
 
 class _Drawn(Figure):
-    """A figure whose picture is what was last drawn: a writer draws nothing again."""
+    """A figure that is not drawn again for a writer of films."""
 
     def savefig(self, fname: Any, **_: Any) -> None:
-        """Give the picture to a writer of films."""
+        """Write the last picture."""
         canvas: Any = self.canvas
         fname.write(canvas.buffer_rgba())
 
 
 def animate(text: str, run: Drawn, path: Path, film: Film) -> None:
-    """Write a film of a run: of its vehicle, or of all of them together.
+    """Write a film of a run with all its vehicles.
 
     Args:
         text: heading.
         run: with the ports of its vehicles, and of their planners if there are references.
-        path: of a .gif, or of an .mp4 where ffmpeg is installed.
-        film: how it is filmed.
+        path: of a .gif, or of an .mp4 if ffmpeg is installed.
+        film: options.
 
     Raises:
         InputError: the film cannot be written.
@@ -123,8 +124,8 @@ def animate(text: str, run: Drawn, path: Path, film: Film) -> None:
         frames = _frames(figure, text, run, film)
         if path.suffix == ".gif":
             first = next(frames).quantize(256, method=Image.Quantize.MAXCOVERAGE)
-            # One palette for all: colours do not flicker, and it is found once.
-            rest = (one.quantize(palette=first, dither=Image.Dither.NONE) for one in frames)
+            # With one palette for all frames, colours do not flicker.
+            rest = (frame.quantize(palette=first, dither=Image.Dither.NONE) for frame in frames)
             first.save(path, save_all=True, append_images=rest, duration=1000 // film.fps, loop=0)
             return
         writer = FFMpegWriter(film.fps)
@@ -137,7 +138,7 @@ def animate(text: str, run: Drawn, path: Path, film: Film) -> None:
 
 
 def _frames(figure: Figure, text: str, run: Drawn, film: Film) -> Iterator[Image.Image]:
-    """Draw each frame in the figure: what does not move is drawn once."""
+    """Draw and yield each frame of the figure; the background is drawn once."""
     canvas: Any = FigureCanvasAgg(figure)
     time = run.result.time
     duration = _DURATION if film.speed is None else float(np.ptp(time)) / film.speed
@@ -165,16 +166,17 @@ def _frames(figure: Figure, text: str, run: Drawn, film: Film) -> Iterator[Image
 
 
 def _draw_scene(axes: Any, run: Drawn) -> Callable[[int], list[Any]]:
-    """Draw what does not move; the function moves the rest to a row, and gives what to draw."""
+    """Draw the background; return a function that moves the vehicles to a row and returns them."""
     table, n = run.result, len(run.loops)
     stride = -(-len(table) // _POINTS)
-    seen = paths = [true_control_point(table, loop) for loop in run.loops]
+    paths = [true_control_point(table, loop) for loop in run.loops]
+    drawn = list(paths)
     references = reference_colours(run.loops) if n > 1 else [REFERENCE]
-    for y_d, colour in dict(zip((one.y_d for one in run.loops), references, strict=True)).items():
+    for y_d, colour in dict(zip((loop.y_d for loop in run.loops), references, strict=True)).items():
         if not table.missing(y_d):
-            seen = [*seen, table.group(*y_d)]
-            axes.plot(*seen[-1][::stride].T, color=colour, linestyle="--", linewidth=0.8)
-    points = np.vstack(seen)
+            drawn.append(table.group(*y_d))
+            axes.plot(*drawn[-1][::stride].T, color=colour, linestyle="--", linewidth=0.8)
+    points = np.vstack(drawn)
     frame_path(axes, points, run.z_up)
     ell = max(real_parameter(table, loop.ell) for loop in run.loops)
     extent = float((np.nanmax(points, axis=0) - np.nanmin(points, axis=0)).max())
@@ -202,9 +204,11 @@ def _draw_scene(axes: Any, run: Drawn) -> Callable[[int], list[Any]]:
 
 
 def _body(length: float, z_up: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Faces of a vehicle, its nose in the origin: corners in the body's axes, and parts.
+    """Return the faces of a vehicle with its nose at the origin.
 
-    Parts are the hull, the upper fin and the other fins.
+    Returns:
+        Corners in body axes, and the part of each face: 0 hull, 1 upper fin, 2 other fins.
+
     """
     angles = 2.0 * np.pi * np.arange(_SIDES + 1) / _SIDES
     rings = np.array([[(-x, r * np.cos(a), r * np.sin(a)) for a in angles] for x, r in RINGS])
@@ -218,7 +222,7 @@ def _body(length: float, z_up: bool) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _draw_panels(figure: Figure, place: SubplotSpec, run: Drawn) -> list[Any]:
-    """Draw the panels beside the scene, as far as there is something in them; gives their axes."""
+    """Draw the panels next to the scene for which there are signals; return their axes."""
     shares = {
         panel: share
         for panel, share in _PANELS[len(run.loops) > 1].items()

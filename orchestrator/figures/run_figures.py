@@ -1,100 +1,489 @@
-"""Figures of a run by the names that scenarios have for them; :mod:`.drawing` draws them.
+"""Figures of a run: their panels, and which panels make up the figure of each name.
 
-A new one is an entry of :data:`FIGURES`, of the panels here and in :mod:`.panels`.
+A new figure is an entry of :data:`FIGURES`; :mod:`.drawing` draws it. Nothing here imports
+matplotlib, which takes as long to import as everything else together: a panel fills axes that it
+is given.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import textwrap
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from itertools import islice
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from auv_fmu.language.quantities import NU, THETA
+from auv_fmu.language.quantities import NU, TAU, THETA
 from orchestrator.cosim import Table
-from orchestrator.figures import fleet_panels
-from orchestrator.figures.panels import (
-    COMMANDS,
-    ERRORS,
-    LOGARITHMIC_ERRORS,
-    PATH,
-    Cell,
-    Panel,
-    Rows,
-    draw_all_errors,
-    draw_lines,
-    over_time,
-    title,
-)
 from orchestrator.figures.style import (
     COLOURS,
     FIGURE_FORMATS,
+    REFERENCE,
+    STYLES,
     Drawn,
     earth_axes,
+    escape_math,
     printed_unit,
     runs_with,
+    vehicle_colours,
 )
-from orchestrator.figures.visible import draw_signal
+from orchestrator.figures.visible import draw_signal, mean_window
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.vehicle.signals import AXES, STANDARD, Loop, Needs, suffixes, true_control_point
+from orchestrator.vehicle.indices import (
+    SMALLEST_DISTANCE_LABEL,
+    distances,
+    for_distances,
+    size,
+    smallest_distances,
+)
+from orchestrator.vehicle.signals import (
+    ACTUATORS,
+    AXES,
+    STANDARD,
+    Loop,
+    Needs,
+    limits,
+    suffixes,
+    tracking_error,
+    true_control_point,
+    waypoints,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.gridspec import SubplotSpec
+    from matplotlib.transforms import Transform
+
+#: Least length of an axis of a path, as a share of the longest: a straight line gets a box.
+_FLATTEST = 0.3
+
+#: The limits of an actuator are in view if a command reaches this share of them.
+_NEAR = 0.5
+
+#: The axis of commands ends at this multiple of the limits; larger peaks are printed.
+_BEYOND = 1.5
+
+#: Lower end of a logarithmic axis of errors [m]: below it there are only zero crossings.
+_SMALLEST_ERROR = 1e-5
+
+#: Widths of the line of the first run and of the runs that it is compared with. The latter are
+#: solid, because a dashed line of an oscillating signal is a smear.
+_THICK, _THIN = 1.4, 0.8
+
+#: Peaks from here on are printed with an exponent [N, N.m].
+_MANY = 1e6
+
+#: Events that are marked per run, and times that are listed per event, at most.
+_MOST_MARKS, _MOST_TIMES = 20, 4
+
+#: Numbers of events closer together than this share of the time axis are stacked, this far [pt].
+_CLOSE, _RISE = 0.04, 13
+
+#: Characters in a line of the list of events, and height of a line [in].
+_LETTERS, _LINE = 104, 0.16
+
+#: Times at which lines join the vehicles of a fleet.
+_INSTANTS = 9
+
+#: Largest number of vehicles whose lines are labelled and whose pairs have a line each.
+_MOST_NAMED = 4
+
+#: Lines of a fleet: in the first run, and in the run that it is compared with.
+_RUN_STYLES: tuple[dict[str, Any], ...] = (
+    {"linewidth": 1.3},
+    {"linewidth": 0.8, "linestyle": "--"},
+)
+
+
+class Cell(NamedTuple):
+    """The part of a figure that a panel fills with axes."""
+
+    figure: Figure
+    place: SubplotSpec
+
+    def axes(self, **options: Any) -> Any:
+        """Return axes that fill the cell."""
+        return self.figure.add_subplot(self.place, **options)
+
+    def stack(self, n: int) -> list[Any]:
+        """Return n axes above each other that share the axis of time."""
+        grid = self.place.subgridspec(n, 1)
+        stack = [self.figure.add_subplot(grid[0])]
+        stack += [self.figure.add_subplot(grid[i], sharex=stack[0]) for i in range(1, n)]
+        for axes in stack:
+            if axes is not stack[-1]:
+                axes.tick_params(labelbottom=False)
+            axes.locator_params("y", nbins=4, steps=[1, 2, 5, 10])
+        return stack
+
+
+class Panel(NamedTuple):
+    """A part of a figure.
+
+    Attributes:
+        name: in messages.
+        needs: columns and parameters that a run must have, by the loop that is drawn.
+        draw: fills a cell with the runs that have them.
+        height: of the cell [in].
+        of_one: if true, only the first run is shown.
+
+    """
+
+    name: str
+    needs: Callable[[Loop], Needs]
+    draw: Callable[[Cell, Sequence[Drawn]], None]
+    height: float = 2.6
+    of_one: bool = False
+
+
+#: The rows of a figure.
+Rows = Sequence[Sequence[Panel]]
+
+
+# Parts that several panels share
+
+
+def title(axes: Axes, text: str) -> None:
+    """Put a title above the axes, and the legend of their lines below the title."""
+    n = len(axes.get_legend_handles_labels()[0])
+    if n < 2:
+        axes.set_title(text)
+        return
+    axes.legend(
+        title=text, alignment="left", ncols=n if n < 4 else -(-n // 2), loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+    )  # fmt: skip
+
+
+def over_time(panels: Sequence[Axes], runs: Sequence[Drawn], has_means: bool = False) -> None:
+    """Give panels the time axis of all runs, with a label below the last panel, and mark events."""
+    start = min(run.result.time[0] for run in runs)
+    end = max(run.result.time[-1] for run in runs)
+    for axes in panels:
+        axes.set_xlim(start, end)
+    _mark_events(panels, runs)
+    window = mean_window(runs[0].result.time)
+    means = f" (line: {window:.3g} s mean, band: raw)" if has_means else ""
+    panels[-1].set_xlabel(f"time [s]{means}")
+
+
+def run_line(i: int, colour: str) -> dict[str, Any]:
+    """Return the style of the line of run i: the first is thick, the others are thin."""
+    return {"color": colour, "linewidth": _THIN if i else _THICK}
+
+
+def _draw_lines(
+    axes: Axes, time: np.ndarray, values: np.ndarray, labels: Sequence[str], run: int = 0
+) -> None:
+    """Draw each column of values (rows, lines); runs from 1 on are thin and black."""
+    for i, (column, label) in enumerate(zip(values.T, labels, strict=True)):
+        if run == 0:
+            axes.plot(time, column, color=COLOURS[i], linestyle=STYLES[i], label=label)
+        else:
+            other = "other run" if (run, i) == (1, 0) else None
+            axes.plot(time, column, color="black", linewidth=0.7, label=other)
+
+
+def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
+    """Set limits, labels and box of 3D axes so that they hold the points of paths, (n, 3) [m]."""
+    points = points[np.isfinite(points).all(axis=1)]
+    lower, upper = np.min(points, axis=0), np.max(points, axis=0)
+    extent = np.maximum(upper - lower, _FLATTEST * max(float((upper - lower).max()), 1e-3))
+    middle = (lower + upper) / 2
+    low, high = (middle - 0.54 * extent).tolist(), (middle + 0.54 * extent).tolist()
+    x, y, z = earth_axes(z_up)
+    axes.set(
+        xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
+        xlabel=x, ylabel=y, zlabel=z,
+    )  # fmt: skip
+    if not z_up:
+        axes.invert_yaxis()
+        axes.invert_zaxis()
+    box = np.maximum(extent, 0.5 * extent.max())
+    flat = float(box.max() / box[2]) - 1.0
+    # A tall box would overlap the panel below, a flat one the panel beside it.
+    zoom = min(0.95 - 0.2 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
+    axes.set_box_aspect(box, zoom=zoom)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.get_major_locator().set_params(nbins=4, steps=None)
+    axes.tick_params(labelsize="small", pad=0)
+    # Any closer, a tick and a minus sign look like one dash.
+    axes.zaxis.set_tick_params(pad=6)
+    # Labels of a flat box would overlap the numbers below it, and be far from those beside it.
+    axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat
+    axes.zaxis.labelpad = 14 - 4 * flat
+
+
+def _axes_from_above(cell: Cell, z_up: bool) -> Any:
+    """Return axes of equal scale with x upwards and y as in :func:`.earth_axes`."""
+    x, y, _ = earth_axes(z_up)
+    axes = cell.axes(xlabel=y, ylabel=x)
+    axes.set_aspect("equal", adjustable="datalim")
+    if z_up:
+        axes.invert_xaxis()
+    return axes
+
+
+# Events: numbered lines in the panels, and a list below the figure
+
+
+def _mark_events(panels: Sequence[Axes], runs: Sequence[Drawn]) -> None:
+    """Draw a line where an event begins or ends, and its number at the foot of the first panel."""
+    events = _events(runs)
+    times = sorted(
+        {(start, i) for i, spans in enumerate(events.values(), 1) for start, *_ in spans}
+    )
+    for time in {time for spans in events.values() for span in spans for time in span}:
+        for axes in panels:
+            axes.axvline(time, color="0.35", linewidth=0.8, linestyle=(0, (1, 1.5)), zorder=1)
+    start, end = panels[0].get_xlim()
+    last: list[float] = []  # time of the last number in each row
+    for time, number in times:
+        row = next(
+            (k for k, other in enumerate(last) if time - other > _CLOSE * (end - start)),
+            len(last),
+        )
+        last[row : row + 1] = [time]
+        panels[0].annotate(
+            str(number), (time, 0), xycoords=panels[0].get_xaxis_transform(),
+            xytext=(0, row * _RISE), textcoords="offset points",
+            ha="center", va="center", fontsize="x-small",
+            bbox={"boxstyle": "circle,pad=0.25", "facecolor": "white", "edgecolor": "0.35"},
+        )  # fmt: skip
+
+
+def list_events(figure: Figure, runs: Sequence[Drawn], grow: bool = True) -> None:
+    """List events below a figure, with their numbers in its panels.
+
+    Args:
+        figure: with panels of the runs.
+        runs: that have the events.
+        grow: make the figure higher, so that its panels keep their height.
+
+    """
+    lines = [f"{i}: {_event_text(label, runs)}" for i, label in enumerate(_events(runs), 1)]
+    if not lines:
+        return
+    text = textwrap.fill("; ".join(lines), _LETTERS)
+    if grow:
+        figure.set_figheight(figure.get_figheight() + _LINE * (2 + text.count("\n")))
+    figure.supxlabel(escape_math(text), x=0.01, ha="left", fontsize="small")
+
+
+def _event_text(label: str, runs: Sequence[Drawn]) -> str:
+    """Return the label of an event with its times, and its runs if they differ."""
+    spans = {run.label: _spans(run).get(label, []) for run in runs}
+    if len({*map(tuple, spans.values())}) == 1:
+        return f"{label}, {_times_text(spans[runs[0].label])}"
+    times = (f"{_times_text(of_run)} ({run})" for run, of_run in spans.items() if of_run)
+    return f"{label}, {', '.join(times)}"
+
+
+def _times_text(spans: Sequence[tuple[float, ...]]) -> str:
+    words = [" to ".join(f"{time:.5g}" for time in span) + " s" for span in spans[:_MOST_TIMES]]
+    return ", ".join([*words, *["..."] * (len(spans) > _MOST_TIMES)])
+
+
+def _events(runs: Sequence[Drawn]) -> dict[str, set[tuple[float, ...]]]:
+    """Return the spans of each event in any of the runs, sorted by the first start."""
+    events: dict[str, set[tuple[float, ...]]] = {}
+    for run in runs:
+        for label, spans in _spans(run).items():
+            events.setdefault(label, set()).update(spans)
+    return dict(sorted(events.items(), key=lambda item: min(item[1])))
+
+
+def _spans(run: Drawn) -> dict[str, list[tuple[float, ...]]]:
+    """Return the start, and the end if there is one, of each occurrence of the events of a run."""
+    occurrences = run.result.ending.events
+    spans: dict[str, list[tuple[float, ...]]] = {}
+    for i, start in enumerate(occurrences[:_MOST_MARKS], start=1):
+        if start.label:
+            later = (end for end in occurrences[i:] if not end.label and end.event == start.event)
+            ends = (end.time for end in islice(later, 1))
+            spans.setdefault(start.label, []).append((start.time, *ends))
+    return spans
+
+
+# Panels of one vehicle
+
+
+def _path(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """Paths of control points and their reference in three dimensions."""
+    axes = cell.axes(projection="3d")
+    paths = []
+    for run, _ in list(runs_with(runs, Loop.for_reference))[:1]:
+        paths.append(run.result.group(*run.loop.y_d))
+        axes.plot(*paths[0].T, color=REFERENCE, linestyle="--", linewidth=1, label="reference")
+        axes.scatter(*paths[0][0], color=REFERENCE, marker="s", s=20, label="reference start")
+        if len(points := waypoints(run.result, run.loop)):
+            paths.append(points)
+            axes.scatter(
+                *points.T, color="black", marker="x", s=25, depthshade=False, label="waypoints"
+            )
+    shown = list(runs_with(runs, Loop.for_control_point))
+    for i, (run, colour) in enumerate(shown):
+        y = true_control_point(run.result, run.loop)
+        paths.append(y)
+        axes.plot(*y.T, **run_line(i, colour), label=None if len(shown) > 1 else "control point")
+        # Rings of growing size, so that common starts remain visible.
+        axes.scatter(
+            *y[0], marker="o", s=20 + 50 * i, edgecolors=colour,
+            facecolors="none" if i else colour, label=None if i else "vehicle start",
+        )  # fmt: skip
+    frame_path(axes, np.vstack(paths), runs[0].z_up)
+    title(axes, "path")
+
+
+def _path_from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
+    axes = _axes_from_above(cell, runs[0].z_up)
+    for run, colour in runs_with(runs, Loop.for_control_point):
+        path = true_control_point(run.result, run.loop)
+        axes.plot(path[:, 1], path[:, 0], color=colour)
+        axes.plot(path[0, 1], path[0, 0], "o", color=colour)
+    title(axes, "path from above")
 
 
 def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    axes = cell.axes()
-    draw_all_errors(axes, runs)
+    """The three tracking errors in one panel."""
+    axes = cell.axes(ylabel="error [m]")
+    for i, (run, _) in enumerate(runs_with(runs, Loop.for_tracking)):
+        errors = tracking_error(run.result, run.loop)
+        _draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], i)
+    title(axes, "tracking errors")
     over_time([axes], runs)
 
 
+def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> None:
+    """Tracking errors, a panel for each axis."""
+    panels = cell.stack(3)
+    for i, (run, colour) in enumerate(runs_with(runs, Loop.for_tracking)):
+        errors = tracking_error(run.result, run.loop)
+        for axes, error in zip(panels, (np.abs(errors) if logarithmic else errors).T, strict=True):
+            axes.plot(run.result.time, error, **run_line(i, colour))
+    for k, axes in zip(AXES, panels, strict=True):
+        axes.set_ylabel(f"$|e_{k}|$ [m]" if logarithmic else f"$e_{k}$ [m]")
+        if logarithmic:
+            axes.set_yscale("log")
+            axes.yaxis.get_major_locator().set_params(numticks=5)
+            if axes.get_ylim()[1] > _SMALLEST_ERROR:
+                axes.set_ylim(bottom=max(_SMALLEST_ERROR, axes.get_ylim()[0]))
+    title(panels[0], "tracking errors" + ", logarithmic" * logarithmic)
+    over_time(panels, runs)
+
+
+def draw_commands(
+    panels: Sequence[Axes], runs: Sequence[Drawn], name: str = "commanded control signals"
+) -> None:
+    """Draw the commands of runs and the limits of (3), a panel for each actuator."""
+    shown = list(runs_with(runs, Loop.for_commands))
+    limited = [run for run, _ in runs_with(runs, Loop.for_limits)]
+    has_means = False
+    for k, axes, unit in zip(range(3), panels, map(printed_unit, TAU.values()), strict=True):
+        for i, (run, colour) in enumerate(shown):
+            command = partial(_command, run.loop.commanded[k])
+            has_means |= draw_signal(axes, run.result, command, **run_line(i, colour))
+        axes.set_ylabel(rf"$\tau_{ACTUATORS[k]}$ [{unit}]")
+        if limited:
+            _draw_limits(axes, k, shown, limited[0], unit)
+    title(panels[0], name)
+    over_time(panels, runs, has_means)
+
+
+def _command(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and values of a command; the last value is held until the end of the run."""
+    command = table.step_values(column)[:, 0]
+    return np.append(table.step_start, table.time[-1]), np.append(command, command[-1])
+
+
+def _draw_limits(
+    axes: Axes, k: int, runs: Sequence[tuple[Drawn, str]], limited: Drawn, unit: str
+) -> None:
+    """Draw the limits of an actuator; print the largest command if it is off the axis."""
+    lower, upper = (float(limit[k]) for limit in limits(limited.result, limited.loop))
+    words = (
+        f"limits ±{upper:g} {unit}" if lower == -upper else f"limits {lower:g}, {upper:g} {unit}"
+    )
+    peaks = ((_peak(run.result.step_values(run.loop.commanded[k])), colour) for run, colour in runs)
+    peak, colour = max(peaks, key=lambda pair: abs(pair[0]))
+    if abs(peak) < _NEAR * min(upper, -lower):
+        bottom, top = axes.get_ylim()
+        axes.set_ylim(bottom, top + 0.2 * (top - bottom))
+        _write(axes, [(f"{words} (off scale)", "black")], 0.98, axes.transAxes, "top")
+        return
+    for limit in (lower, upper):
+        axes.axhline(limit, color="black", linewidth=0.8)
+    bottom, _ = axes.get_ylim()
+    axes.set_ylim(max(min(bottom, 1.2 * lower), _BEYOND * lower), _BEYOND * upper)
+    texts = [(words, "black")]
+    if abs(peak) > _BEYOND * max(upper, -lower):
+        number = f"{peak:,.0f}" if abs(peak) < _MANY else f"{peak:.2g}"
+        number = number.replace("-", "\N{MINUS SIGN}")
+        texts.append((f"peak {number} {unit}", colour))
+    _write(axes, texts, upper, axes.get_yaxis_transform(), "bottom")
+
+
+def _peak(values: np.ndarray) -> float:
+    """Return the finite value that is farthest from 0, with its sign; 0 if there is none."""
+    values = values[np.isfinite(values)]
+    return float(values[np.abs(values).argmax()]) if len(values) else 0.0
+
+
+def _write(
+    axes: Axes, texts: Sequence[tuple[str, str]], y: float, transform: Transform, va: str
+) -> None:
+    """Write texts in their colours at the right of a panel, on a background that covers lines."""
+    place: tuple[Any, ...] = (1.0, y), transform, (0, 2 if va == "bottom" else 0)
+    for text, colour in reversed(texts):
+        at, coordinates, offset = place
+        written = axes.annotate(
+            text, at, xycoords=coordinates, xytext=offset, textcoords="offset points",
+            ha="right", va=va, fontsize="small", color=colour,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
+        )  # fmt: skip
+        place = (0.0, 0.0 if va == "bottom" else 1.0), written, (-5, 0)
+
+
 def _estimates(cell: Cell, runs: Sequence[Drawn]) -> None:
-    axes = cell.axes()
+    axes = cell.axes(ylabel="estimate")
     labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in THETA.items()]
     for i, (run, _) in enumerate(runs_with(runs, Loop.for_parameter_estimates)):
         estimates = run.result.step_values(*run.loop.theta_hat)
-        draw_lines(axes, run.result.step_start, estimates, labels, i)
-    axes.set_ylabel("estimate")
+        _draw_lines(axes, run.result.step_start, estimates, labels, i)
     title(axes, "estimated parameters")
     over_time([axes], runs)
 
 
-def _estimated_velocity(cell: Cell, runs: Sequence[Drawn]) -> None:
-    """True and estimated velocity of the control point."""
+def _velocity(cell: Cell, runs: Sequence[Drawn], *, errors: bool = False) -> None:
+    """Estimated and true velocity of the control point, or the errors of the estimate."""
     run, _ = next(runs_with(runs, Loop.for_velocity_estimates))
-    time, true = run.result.step_start, run.result.start_values(*run.loop.dy)
-    panels = cell.stack(3)
-    has_means = False
-    for k, axes, truth, column in zip(AXES, panels, true.T, run.loop.dy_hat, strict=True):
-        estimate = partial(_estimated, column)
-        has_means |= draw_signal(axes, run.result, estimate, color=COLOURS[1], label="estimated")
-        axes.plot(time, truth, color=COLOURS[0], linestyle="--", label="true (not measured)")
-        axes.set_ylabel(rf"$\dot{{y}}_{k}$ [m/s]")
-    title(panels[0], "velocity of the control point")
-    over_time(panels, runs, has_means)
-
-
-def _velocity_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
-    """Estimated velocity of the control point minus the true one."""
-    run, _ = next(runs_with(runs, Loop.for_velocity_estimates))
-    panels = cell.stack(3)
-    has_means = False
+    table, panels, has_means = run.result, cell.stack(3), False
     for k, axes, estimate, truth in zip(AXES, panels, run.loop.dy_hat, run.loop.dy, strict=True):
-        error = partial(_velocity_error, estimate, truth)
-        has_means |= draw_signal(axes, run.result, error, color=COLOURS[1])
-        axes.set_ylabel(rf"$\Delta \dot{{y}}_{k}$ [m/s]")
-    title(panels[0], "estimate - true")
+        signal = partial(_estimated_velocity, estimate, truth if errors else None)
+        has_means |= draw_signal(axes, table, signal, color=COLOURS[1], label="estimated")
+        axes.set_ylabel(rf"$\Delta \dot{{y}}_{k}$ [m/s]" if errors else rf"$\dot{{y}}_{k}$ [m/s]")
+        if not errors:
+            axes.plot(
+                table.step_start, table.start_values(truth)[:, 0],
+                color=COLOURS[0], linestyle="--", label="true (not measured)",
+            )  # fmt: skip
+    title(panels[0], "estimate - true" if errors else "velocity of the control point")
     over_time(panels, runs, has_means)
 
 
-def _estimated(column: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
-    return table.step_start, table.step_values(column)[:, 0]
-
-
-def _velocity_error(estimate: str, truth: str, table: Table) -> tuple[np.ndarray, np.ndarray]:
-    time, estimated = _estimated(estimate, table)
-    return time, estimated - table.start_values(truth)[:, 0]
+def _estimated_velocity(
+    estimate: str, truth: str | None, table: Table
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return times and values of an estimate, minus the truth if it is given."""
+    values = table.step_values(estimate)[:, 0]
+    return table.step_start, values - table.start_values(truth)[:, 0] if truth else values
 
 
 def _motion(name: str, directions: slice, is_rate: bool = False) -> Panel:
-    """Velocities, or D nu/dt as the plant's Euler scheme has it: the difference over the step."""
+    """Return a panel of velocities, or of D nu/dt by the plant's Euler scheme: nu' - nu over h."""
     unit = printed_unit(list(NU.values())[directions][0])
 
     def needs(loop: Loop) -> Needs:
@@ -108,59 +497,151 @@ def _motion(name: str, directions: slice, is_rate: bool = False) -> Panel:
         if is_rate:
             time, values = time[:-1], np.diff(values, axis=0) / np.diff(time)[:, np.newaxis]
         symbol = r"$\dot{{{}}}$" if is_rate else "${}$"
-        draw_lines(axes, time, values, [symbol.format(column[-1]) for column in columns])
+        _draw_lines(axes, time, values, [symbol.format(column[-1]) for column in columns])
         title(axes, name)
         over_time([axes], runs)
 
     return Panel(name, needs, draw, of_one=True)
 
 
-def _from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
-    x, y, _ = earth_axes(runs[0].z_up)
-    axes = cell.axes(xlabel=y, ylabel=x)
-    axes.set_aspect("equal", adjustable="datalim")
-    if runs[0].z_up:
-        axes.invert_xaxis()
-    for run, colour in runs_with(runs, Loop.for_control_point):
-        path = true_control_point(run.result, run.loop)
-        axes.plot(path[:, 1], path[:, 0], color=colour)
-        axes.plot(path[0, 1], path[0, 0], "o", color=colour)
-    title(axes, "path from above")
+# Panels of several vehicles
 
 
+def _vehicles(run: Drawn, needs: Callable[[Loop], Needs]) -> Iterator[tuple[Loop, str]]:
+    """Yield the vehicles that have what is needed, each with its colour."""
+    for loop, colour in zip(run.loops, vehicle_colours(len(run.loops)), strict=True):
+        if not run.result.missing(*needs(loop)):
+            yield loop, colour
+
+
+def _vehicle_label(run: Drawn, loop: Loop) -> str | None:
+    return loop.name if len(run.loops) <= _MOST_NAMED else None
+
+
+def _fleet_paths(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """Paths of the control points of the first run, and their references."""
+    run, axes = runs[0], cell.axes(projection="3d")
+    paths = []
+    for loop, _ in _vehicles(run, Loop.for_reference):
+        paths.append(run.result.group(*loop.y_d))
+        axes.plot(*paths[-1].T, color=REFERENCE, linestyle="--", linewidth=0.8)
+    for loop, colour in _vehicles(run, Loop.for_control_point):
+        paths.append(true_control_point(run.result, loop))
+        axes.plot(*paths[-1].T, color=colour, linewidth=1.3, label=_vehicle_label(run, loop))
+        axes.scatter(*paths[-1][0], color=colour, s=20)
+    frame_path(axes, np.vstack(paths), run.z_up)
+    title(axes, "paths, and references (dashed)")
+
+
+def _fleet_from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """The same paths from above, with lines from the first vehicle to the others at some times."""
+    run, axes = runs[0], _axes_from_above(cell, runs[0].z_up)
+    shown = list(_vehicles(run, Loop.for_control_point))
+    paths = [true_control_point(run.result, loop) for loop, _ in shown]
+    for path, (_, colour) in zip(paths, shown, strict=True):
+        axes.plot(path[:, 1], path[:, 0], color=colour, linewidth=0.8)
+    time = run.result.time
+    instants = np.linspace(time[0], time[-1], _INSTANTS)
+    for row in np.searchsorted(time, instants).clip(0, len(time) - 1).tolist():
+        points = np.array([path[row] for path in paths])
+        spokes = np.array([(points[0], point) for point in points[1:]]).reshape(-1, 2, 3)
+        axes.plot(*spokes[:, :, 1::-1].T, color="black", linewidth=0.8, zorder=3)
+        axes.scatter(points[:, 1], points[:, 0], color=[c for _, c in shown], s=14, zorder=4)
+    between = (time[-1] - time[0]) / (_INSTANTS - 1)
+    title(axes, f"from above, joined every {between:.3g} s")
+
+
+def _fleet_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """Norm of the tracking error of each vehicle."""
+    axes = cell.axes(ylabel="|e| [m]")
+    for run, style in zip(runs, _RUN_STYLES, strict=False):
+        for loop, colour in _vehicles(run, Loop.for_tracking):
+            error = size(tracking_error(run.result, loop))
+            label = _vehicle_label(run, loop) if run is runs[0] else None
+            axes.plot(run.result.time, error, color=colour, label=label, **style)
+    axes.set_ylim(bottom=0.0)
+    title(axes, _compared("size of the tracking errors", runs))
+    over_time([axes], runs)
+
+
+def _needs_distances(loop: Loop) -> Needs:
+    return for_distances([loop])
+
+
+def _distances(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """Distance between each two of a few vehicles, or the smallest distance of all."""
+    axes = cell.axes(ylabel="distance [m]")
+    for run, style in zip(runs, _RUN_STYLES, strict=False):
+        loops = [loop for loop, _ in _vehicles(run, _needs_distances)]
+        if len(loops) <= _MOST_NAMED and run is runs[0]:
+            apart = distances(run.result, loops)
+            for (names, values), colour in zip(apart.items(), COLOURS, strict=False):
+                axes.plot(run.result.time, values, color=colour, label=" to ".join(names), **style)
+        else:
+            smallest = smallest_distances(run.result, loops)
+            axes.plot(run.result.time, smallest, color="black", label="smallest", **style)
+    axes.set_ylim(bottom=0.0)
+    title(axes, _compared("distances between vehicles", runs))
+    over_time([axes], runs)
+
+
+def _smallest_distance(cell: Cell, runs: Sequence[Drawn]) -> None:
+    """Smallest distance between any two vehicles."""
+    axes, table = cell.axes(ylabel="distance [m]"), runs[0].result
+    axes.plot(table.time, smallest_distances(table, runs[0].loops), color=REFERENCE)
+    axes.set_ylim(bottom=0.0)
+    title(axes, SMALLEST_DISTANCE_LABEL)
+    over_time([axes], runs)
+
+
+def _compared(text: str, runs: Sequence[Drawn]) -> str:
+    return f"{text}, {runs[1].label} dashed" if len(runs) > 1 else text
+
+
+PATH = Panel("path", Loop.for_control_point, _path, 3.4)
+FROM_ABOVE = Panel("path from above", Loop.for_control_point, _path_from_above)
 ALL_ERRORS = Panel("tracking errors", Loop.for_tracking, _all_errors, 3.4)
-ESTIMATES = Panel("estimated parameters", Loop.for_parameter_estimates, _estimates, 3.6)
-VELOCITY = Panel("estimated velocity", Loop.for_velocity_estimates, _estimated_velocity, 4.6, True)
-VELOCITY_ERRORS = Panel(
-    "error of the estimated velocity", Loop.for_velocity_estimates, _velocity_errors, 4.6, True
+ERRORS = Panel("tracking errors", Loop.for_tracking, _errors, 4.0)
+LOGARITHMIC_ERRORS = Panel(
+    "logarithmic tracking errors", Loop.for_tracking, partial(_errors, logarithmic=True), 4.0
 )
-FROM_ABOVE = Panel("path from above", Loop.for_control_point, _from_above)
+COMMANDS = Panel(
+    "commands", Loop.for_commands, lambda cell, runs: draw_commands(cell.stack(3), runs), 4.0
+)
+ESTIMATES = Panel("estimated parameters", Loop.for_parameter_estimates, _estimates, 3.6)
+VELOCITY = Panel("estimated velocity", Loop.for_velocity_estimates, _velocity, 4.6, of_one=True)
+VELOCITY_ERRORS = Panel(
+    "error of the estimated velocity", Loop.for_velocity_estimates,
+    partial(_velocity, errors=True), 4.6, of_one=True,
+)  # fmt: skip
+FLEET_PATHS = Panel("paths", Loop.for_control_point, _fleet_paths, 3.6, of_one=True)
+FLEET_FROM_ABOVE = Panel(
+    "paths from above", Loop.for_control_point, _fleet_from_above, 3.6, of_one=True
+)
+FLEET_ERRORS = Panel("sizes of errors", Loop.for_tracking, _fleet_errors, 3.0, of_one=True)
+DISTANCES = Panel("distances", _needs_distances, _distances, 3.0, of_one=True)
+SMALLEST_DISTANCE = Panel("smallest distance", _needs_distances, _smallest_distance, of_one=True)
 
 _SURGE, _LINEAR, _ANGULAR = slice(1), slice(3), slice(3, None)
 
-#: The figure of several vehicles together, and of how many each has its own besides.
+#: Name of the figure of several vehicles together, and the number of vehicles up to which each
+#: also has a figure of its own.
 FLEET, MOST_DRAWN = "fleet", 10
 
-#: Rows of panels by what the names of their files end with, for each name.
+#: Figures by name: for each, its files' suffixes and the rows of panels in each file.
 FIGURES: Mapping[str, Mapping[str, Rows]] = {
-    # Figs. 4 and 7: one run, and thin and black its twin, say without noise.
+    # Figs. 4 and 7: one run, and thin and black another one, for example without noise.
     "tracking": {
         "": ((PATH, ALL_ERRORS), (COMMANDS, ESTIMATES)),
         "-velocity": ((VELOCITY, VELOCITY_ERRORS),),
     },
     # Fig. 5.
     "comparison": {"": ((PATH, COMMANDS), (ERRORS, LOGARITHMIC_ERRORS))},
-    # Fig. 6: the paper leaves out the control signals.
+    # Fig. 6: the paper shows no control signals.
     "comparison-errors": {"": ((ERRORS, LOGARITHMIC_ERRORS),)},
-    # Fig. 7 in one: any number of runs.
+    # Fig. 7 in one figure: any number of runs.
     "overlay": {"": ((ERRORS, COMMANDS),)},
-    # Several vehicles together.
-    FLEET: {
-        "": (
-            (fleet_panels.PATHS, fleet_panels.FROM_ABOVE),
-            (fleet_panels.ERRORS, fleet_panels.DISTANCES),
-        )
-    },
+    FLEET: {"": ((FLEET_PATHS, FLEET_FROM_ABOVE), (FLEET_ERRORS, DISTANCES))},
     # Fig. 3(a): only the vehicle.
     "open-loop-surge": {
         "": (
@@ -183,14 +664,14 @@ FIGURES: Mapping[str, Mapping[str, Rows]] = {
 
 
 def figures_of(key: str, loops: Sequence[Loop]) -> Iterator[tuple[str, str, Sequence[Loop]]]:
-    """The figures of a run: of all vehicles together, and of each.
+    """Yield the figures of a run: of all vehicles together, and of each.
 
     Args:
-        key: of :data:`FIGURES` that a single vehicle has.
+        key: of :data:`FIGURES`, for a single vehicle.
         loops: of the vehicles.
 
     Yields:
-        A key, what the names of the files go on with, and the loops that are drawn.
+        A key of :data:`FIGURES`, the vehicle's part of the file names, and the loops to draw.
 
     """
     if len(loops) > 1 or key == FLEET:
@@ -200,29 +681,24 @@ def figures_of(key: str, loops: Sequence[Loop]) -> Iterator[tuple[str, str, Sequ
 
 
 def check_figure(key: str) -> None:
-    """Check before a run that its figure is known.
-
-    Raises:
-        InputError: it is not.
-
-    """
+    """Raise an InputError if there is no figure with a name."""
     if key not in FIGURES:
         hint = did_you_mean(key, FIGURES) or f"; there are {', '.join(FIGURES)}"
         raise InputError(f"no figure {key!r}{hint}")
 
 
 def figure_files(key: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> list[str]:
-    """The files that :func:`.draw` may write.
+    """Return the names of all files that :func:`.draw` may write for some vehicles.
 
     Args:
         key: of :data:`FIGURES`.
-        stem: of their names.
+        stem: of the file names.
         loops: of the vehicles.
 
     """
     return [
         f"{stem}{vehicle}{suffix}.{ending}"
-        for of, vehicle, _ in figures_of(key, loops)
-        for suffix in FIGURES[of]
+        for figure, vehicle, _ in figures_of(key, loops)
+        for suffix in FIGURES[figure]
         for ending in FIGURE_FORMATS
     ]

@@ -1,12 +1,12 @@
-"""Figures of a study from its runs: a study file says which.
+"""Figures of a study.
 
-A new one is a function here, which :data:`_DRAW` names, and an entry of :data:`.CHARTS`.
+A new kind is a function here, an entry of :data:`_DRAW`, and an entry of :data:`.CHARTS`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import cycle, product
 from pathlib import Path
 from typing import Any
@@ -20,73 +20,132 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from orchestrator.figures.drawing import save, styled
-from orchestrator.figures.study_values import (
-    VERDICTS,
-    Bins,
-    Columns,
-    FigureEntry,
-    Values,
-    bins_of,
-    grouped,
-    is_logarithmic,
-)
+from orchestrator.figures.study_values import VERDICTS, FigureEntry, Values
 from orchestrator.figures.style import COLOURS, FIGURE_FORMATS, FIGURE_WIDTH, STYLES, heading
 from orchestrator.machine.disk import file_name
 
-#: Heights of a row of panels, of a panel by itself, of a row of a matrix and what surrounds it, and
-#: of a bar of colours with its name at least [in].
+#: Heights of a row of panels, of a single panel, of a row of a matrix and of the space around it,
+#: and least height of a colour bar with its label [in].
 _ROW, _SQUARE, _LINE, _AROUND, _BAR = 2.3, 4.0, 0.27, 0.5, 1.3
 
-#: Bands: parts of an axis along which runs are counted together, shares of the runs between which
-#: the band lies, and panels in a row, where there is one x.
-_BINS, _LOWER, _UPPER, _ABREAST = 30, 0.1, 0.9, 2
-
-#: Maps: cells along each axis of runs that do not form a grid; the colours end where all but a
-#: share of the cells do, so that a few outliers do not dim the others.
-_CELLS, _FAR = 24, 0.01
-
-#: Colours that stay apart for colour-blind eyes and in print, the one of a cell without runs, and
-#: the scale of correlations: blue falls, red grows.
-_VALUES, _EMPTY, _CORRELATIONS = "cividis", "lightgrey", "RdBu_r"
-
-#: Influence: numbers are white upon colours as dark as from here on; smaller ones are not printed.
-_DARK, _NOTHING = 0.6, 0.05
-
-#: More lines or panels than this show nothing.
-_MOST_PARTS = 12
-
-#: Room for a heading, and for a legend or the names of axes [in].
+#: Heights of a heading, and of a legend or of labels of axes [in].
 _HEADING, _NAMES = 0.3, 0.45
 
-#: Numbers along a logarithmic axis, and powers of ten up to which there are ticks between them;
-#: with fewer powers of ten than the last, 3 has a number as well, and below one power 2 and 5.
+#: Bands: number of bins, shares of the runs below and above which the band ends, and panels in a
+#: row if there is one x.
+_BINS, _LOWER, _UPPER, _ABREAST = 30, 0.1, 0.9, 2
+
+#: Maps: number of bins along each axis, and the share of cells at each end that have the colour of
+#: the end, so that a few outliers do not dim the others.
+_CELLS, _FAR = 24, 0.01
+
+#: Up to so many different values have a bin each.
+_GRID = 40
+
+#: Colour scales that the colour-blind can read and that survive print, and the colour of a cell
+#: without runs. Correlations: blue falls, red grows.
+_VALUES, _EMPTY, _CORRELATIONS = "cividis", "lightgrey", "RdBu_r"
+
+#: Influence: numbers are white on colours from here on; smaller numbers are not printed.
+_DARK, _NOTHING = 0.6, 0.05
+
+#: Largest number of lines or panels.
+_MOST_PARTS = 12
+
+#: Logarithmic axes: numbers at most, decades up to which there are ticks between them, and
+#: decades below which also 3 has a number (below one decade 2 and 5).
 _TICKS, _SMALL_TICKS, _FEW = 6, 12, 2.5
 
+#: An axis is logarithmic if its values are positive and their quantile of this share is so many
+#: times the opposite one.
+_LARGE, _WIDE = 0.95, 10.0
 
-def make_panels(
-    title: str, rows: int, columns: int, height: float, **how: Any
-) -> tuple[Figure, Any]:
-    """A figure with panels.
+#: Largest difference between the ratios of a geometric grid, as a share of the ratio minus 1.
+_EVEN = 1e-6
 
-    Args:
-        title: heading; empty for none.
-        rows: of panels.
-        columns: of panels.
-        height: of a row [in].
-        how: for matplotlib's subplots.
 
-    Returns:
-        The figure, and its axes in rows and columns.
+# Bins and axes
+
+
+@dataclass(frozen=True)
+class Bins:
+    """The bins of an axis.
+
+    Attributes:
+        edges: one more than there are bins.
+        centres: of the bins; the values of a grid.
+        is_logarithmic: True for a logarithmic axis.
 
     """
-    figure = Figure(figsize=(FIGURE_WIDTH, rows * height + _NAMES + _HEADING * bool(title)))
-    if title:
-        figure.suptitle(heading(title), wrap=True)
-    return figure, figure.subplots(rows, columns, squeeze=False, **how)
+
+    edges: np.ndarray
+    centres: np.ndarray
+    is_logarithmic: bool
+
+    def places(self, values: np.ndarray) -> np.ndarray:
+        """Return the number of the bin of each value."""
+        places: np.ndarray = np.searchsorted(self.edges[1:-1], values, side="right")
+        return places
 
 
-def spread(axis: Any, is_wide: bool) -> None:
-    """Make an axis logarithmic if its values are wide, with a few powers of ten along it."""
+def is_logarithmic(values: np.ndarray) -> bool:
+    """Return true if values are so far apart that only a logarithmic axis shows them all."""
+    values = values[np.isfinite(values)]
+    if not values.size or values.min() <= 0.0:
+        return False
+    small, large = np.quantile(values, (1.0 - _LARGE, _LARGE))
+    return bool(large >= _WIDE * small)
+
+
+def _is_geometric(grid: np.ndarray) -> bool:
+    """Return true if each value of a sorted grid is the same multiple of the one before."""
+    if len(grid) < 3 or grid[0] <= 0.0:
+        return False
+    ratios = grid[1:] / grid[:-1]
+    return bool(np.ptp(ratios) < _EVEN * (ratios[0] - 1.0))
+
+
+def bins_of(
+    values: np.ndarray, most: int, *, are_full: bool = False, is_wide: bool | None = None
+) -> Bins:
+    """Return bins for values, at least one of which is finite.
+
+    Args:
+        values: of a grid, or any.
+        most: number of bins of values that are no grid.
+        are_full: if set, these bins have equally many values, else equal widths.
+        is_wide: True for a logarithmic axis; None: decided by the values.
+
+    """
+    values = values[np.isfinite(values)]
+    if is_wide is None:
+        is_wide = is_logarithmic(values) or _is_geometric(np.unique(values))
+    places = np.unique(np.log(values) if is_wide else values)
+    if len(places) > _GRID:
+        even = np.linspace(0.0, 1.0, most + 1)
+        edges = np.quantile(places, even) if are_full else np.interp(even, (0, 1), places[[0, -1]])
+        centres = 0.5 * (edges[1:] + edges[:-1])
+    else:
+        between = 0.5 * (places[1:] + places[:-1])
+        # The outer bins are as wide as if there were one more neighbour.
+        first, last = (between[0], between[-1]) if between.size else (places + 0.5, places - 0.5)
+        edges = np.hstack((2.0 * places[0] - first, between, 2.0 * places[-1] - last))
+        centres = places
+    if is_wide:
+        edges, centres = np.exp(edges), np.exp(centres)
+    return Bins(edges, centres, is_wide)
+
+
+def grouped(places: np.ndarray, values: np.ndarray, n: int) -> list[np.ndarray]:
+    """Return the finite values in each of n bins, from the number of the bin of each value."""
+    finite = np.isfinite(values)
+    places, values = places[finite], values[finite]
+    order = np.argsort(places, kind="stable")
+    return np.split(values[order], np.searchsorted(places[order], np.arange(1, n)))
+
+
+def _scale(axis: Any, is_wide: bool) -> None:
+    """Make an axis logarithmic, with ticks at a few powers of ten, if its values are wide."""
     if not is_wide:
         return
     [name] = axis.axis_name
@@ -102,121 +161,121 @@ def spread(axis: Any, is_wide: bool) -> None:
         axis.set_major_formatter("{x:g}")
 
 
-def legend(figure: Figure, *more: Artist) -> None:
-    """Say below all panels what their lines mean, and what else there is in them.
+def _panels(
+    title: str, rows: int, columns: int, height: float, **options: Any
+) -> tuple[Figure, Any]:
+    """Return a figure and its axes in rows [in high] and columns; options are of `subplots`."""
+    figure = Figure(figsize=(FIGURE_WIDTH, rows * height + _NAMES + _HEADING * bool(title)))
+    if title:
+        figure.suptitle(heading(title), wrap=True)
+    return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
-    Args:
-        figure: whose panels have lines with labels.
-        more: samples with labels.
 
-    """
+def _add_legend(figure: Figure, *samples: Artist) -> None:
+    """Add a legend below all panels: of their lines, and of samples with labels."""
     handles = {
         label: handle
         for axes in figure.axes
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
     }
-    handles |= {str(sample.get_label()): sample for sample in more}
-    if len(handles) > 1 or more:
+    handles |= {str(sample.get_label()): sample for sample in samples}
+    if len(handles) > 1 or samples:
         figure.legend(
             handles=list(handles.values()), loc="outside lower center", ncols=min(2, len(handles))
         )
 
 
 def _sample(colour: str, text: str, alpha: float = 1.0) -> Patch:
-    """A sample of a colour for a legend."""
     return Patch(facecolor=colour, alpha=alpha, linewidth=0, label=text)
 
 
+# Kinds of figures
+
+
 def bands(entry: FigureEntry, title: str, runs: Values) -> Figure:
-    """A row of panels for each value that is shown, a column for each x; runs apart by colours."""
+    """Draw a row of panels for each value shown and a column for each x, with coloured bands."""
     abreast = len(entry.x) if len(entry.x) > 1 else min(_ABREAST, len(entry.show))
     shown = list(product(entry.show, entry.x))
     sharing = "row" if len(entry.x) > 1 else False
-    figure, panels = make_panels(title, -(-len(shown) // abreast), abreast, _ROW, sharey=sharing)
+    figure, panels = _panels(title, -(-len(shown) // abreast), abreast, _ROW, sharey=sharing)
     parts = list(runs.parts(entry.by))
     for axes, (value, x) in zip(panels.flat, shown, strict=False):
-        bins = bins_of(runs[x], _BINS, are_full=True, is_wide=entry.logarithmic.get(x))
-        for (name, part), colour, style in zip(parts, cycle(COLOURS), cycle(STYLES), strict=False):
-            _draw(axes, bins, part[x], part[value], value in VERDICTS, (name, colour, style))
+        bins = bins_of(runs[x], _BINS, are_full=True, is_wide=runs.logarithmic.get(x))
+        for (label, part), colour, style in zip(parts, cycle(COLOURS), cycle(STYLES), strict=False):
+            line = {"color": colour, "linestyle": style, "label": label}
+            groups = grouped(bins.places(part[x]), part[value], len(bins.centres))
+            middle = np.mean if value in VERDICTS else np.median
+            axes.plot(bins.centres, [_of_group(middle, group) for group in groups], **line)
+            if value not in VERDICTS:
+                ends = [
+                    np.quantile(group, (_LOWER, _UPPER)) if len(group) else (np.nan, np.nan)
+                    for group in groups
+                ]
+                axes.fill_between(
+                    bins.centres, *np.transpose(ends), color=colour, alpha=0.2, linewidth=0
+                )
         if value in entry.limits:
             axes.axhline(entry.limits[value], color="black", linewidth=0.8, label="limit")
         axes.margins(x=0)
-        spread(axes.xaxis, bins.is_logarithmic)
-        spread(axes.yaxis, is_logarithmic(runs[value]))
+        _scale(axes.xaxis, bins.is_logarithmic)
+        _scale(axes.yaxis, is_logarithmic(runs[value]))
         axes.set_xlabel(runs.label(x))
         if x == entry.x[0]:
             axes.set_title(runs.label(value))
     for axes in panels.flat[len(shown) :]:
         axes.remove()
     has_bands = any(value not in VERDICTS for value in entry.show)
-    share = _UPPER - _LOWER
-    legend(
-        figure, *[_sample("grey", f"band: {share:.0%} of the runs, line: median", 0.3)] * has_bands
-    )
+    band = f"band: {_UPPER - _LOWER:.0%} of the runs, line: median"
+    _add_legend(figure, *[_sample("grey", band, 0.3)] * has_bands)
     return figure
 
 
-def _draw(
-    axes: Axes,
-    bins: Bins,
-    x: np.ndarray,
-    values: np.ndarray,
-    is_share: bool,
-    look: tuple[str, str, str],
-) -> None:
-    """Draw a line; a share needs no band."""
-    label, color, linestyle = look
-    groups = grouped(bins.places(x), values, len(bins.centres))
-    middle = [
-        np.nan if not len(group) else group.mean() if is_share else np.median(group)
-        for group in groups
-    ]
-    axes.plot(bins.centres, middle, color=color, linestyle=linestyle, label=label)
-    if not is_share:
-        ends = [
-            np.quantile(group, (_LOWER, _UPPER)) if len(group) else (np.nan, np.nan)
-            for group in groups
-        ]
-        axes.fill_between(bins.centres, *np.transpose(ends), color=color, alpha=0.2, linewidth=0)
+def _of_group(reduction: Callable[..., Any], group: np.ndarray) -> Any:
+    return reduction(group) if len(group) else np.nan
 
 
 def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
-    """Panels for each value that is shown, with one scale of colours.
+    """Draw panels of medians, or of shares of verdicts, with one colour scale for each value shown.
 
-    The last column that tells runs apart has its values side by side, the others below each other.
+    The values of the last column that tells runs apart are side by side, the others stacked.
     """
     [x], y = entry.x, entry.y
     across, down = (
-        bins_of(runs[name], _CELLS, is_wide=entry.logarithmic.get(name)) for name in (x, y)
+        bins_of(runs[name], _CELLS, is_wide=runs.logarithmic.get(name)) for name in (x, y)
     )
+    shape = len(down.centres), len(across.centres)
     beside = [name for name, _ in runs.parts(entry.by[-1:])]
     below = list(runs.parts(entry.by[:-1]))
     rows = len(entry.show) * len(below)
-    figure, panels = make_panels(title, rows, len(beside), _ROW, sharex=True, sharey=True)
+    figure, panels = _panels(title, rows, len(beside), _ROW, sharex=True, sharey=True)
     has_gaps = False
     for value, own in zip(entry.show, np.split(panels, len(entry.show)), strict=True):
+        middle = np.mean if value in VERDICTS else np.median
         drawn: dict[Axes, np.ndarray] = {}
         for row, (name, part) in zip(own, below, strict=True):
             row[0].set_ylabel("\n".join(filter(None, (name, runs.label(y)))))
             for other, cell in part.parts(entry.by[-1:]):
-                axes = row[beside.index(other)]
                 places = down.places(cell[y]), across.places(cell[x])
-                drawn[axes] = _cells(places, cell[value], (down, across), value in VERDICTS)
-        norm = _norm(np.array(list(drawn.values())), value in VERDICTS)
-        for axes, middles in drawn.items():
+                groups = grouped(
+                    np.ravel_multi_index(places, shape), cell[value], shape[0] * shape[1]
+                )
+                middles = [_of_group(middle, group) for group in groups]
+                drawn[row[beside.index(other)]] = np.reshape(middles, shape)
+        norm = _colour_scale(np.array(list(drawn.values())), value in VERDICTS)
+        for axes, cells in drawn.items():
             image = axes.pcolormesh(
-                across.edges, down.edges, middles, norm=norm, cmap=_VALUES, rasterized=True
+                across.edges, down.edges, cells, norm=norm, cmap=_VALUES, rasterized=True
             )
             axes.set_facecolor(_EMPTY)
             axes.grid(visible=False)
-            if value in entry.limits and min(middles.shape) > 1:
+            if value in entry.limits and min(cells.shape) > 1:
                 edge = [entry.limits[value]]
-                axes.contour(across.centres, down.centres, middles, edge, colors="white")
+                axes.contour(across.centres, down.centres, cells, edge, colors="white")
         label = runs.label(value)
         if value in entry.limits:
             label += f"\n(white line: {entry.limits[value]:g})"
         has_gaps |= bool(np.isnan(list(drawn.values())).any())
-        # A share has ends; other colours stop before the farthest values.
+        # A share has ends; other scales end before the most distant values.
         has_ends = (norm.vmin, norm.vmax) == (0.0, 1.0)
         figure.colorbar(
             image, ax=list(own.flat), label=label, extend="neither" if has_ends else "both"
@@ -226,27 +285,13 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
     for axes in panels[-1]:
         axes.set_xlabel(runs.label(x))
     # All panels share their axes.
-    spread(axes.xaxis, across.is_logarithmic)
-    spread(axes.yaxis, down.is_logarithmic)
-    legend(figure, *[_sample(_EMPTY, "no run has a value here")] * has_gaps)
+    _scale(axes.xaxis, across.is_logarithmic)
+    _scale(axes.yaxis, down.is_logarithmic)
+    _add_legend(figure, *[_sample(_EMPTY, "no run has a value here")] * has_gaps)
     return figure
 
 
-def _cells(
-    places: tuple[np.ndarray, np.ndarray],
-    values: np.ndarray,
-    bins: tuple[Bins, Bins],
-    is_verdict: bool,
-) -> np.ndarray:
-    """The median of each cell, or the share of a verdict; nan where there are no runs."""
-    shape = len(bins[0].centres), len(bins[1].centres)
-    groups = grouped(np.ravel_multi_index(places, shape), values, shape[0] * shape[1])
-    middle = np.mean if is_verdict else np.median
-    return np.reshape([middle(group) if len(group) else np.nan for group in groups], shape)
-
-
-def _norm(values: np.ndarray, is_verdict: bool) -> Any:
-    """The scale of the colours."""
+def _colour_scale(values: np.ndarray, is_verdict: bool) -> Any:
     values = values[np.isfinite(values)]
     if is_verdict or not len(values):
         return Normalize(0.0, 1.0)
@@ -255,8 +300,8 @@ def _norm(values: np.ndarray, is_verdict: bool) -> Any:
 
 
 def front(entry: FigureEntry, title: str, runs: Values) -> Figure:
-    """Every run a dot; a line through those than which no other is better in both values."""
-    figure, [[axes]] = make_panels(title, 1, 1, _SQUARE)
+    """Draw a dot for each run, and a line through those that no other beats in both values."""
+    figure, [[axes]] = _panels(title, 1, 1, _SQUARE)
     [x] = entry.x
     for (name, part), colour, style in zip(
         runs.parts(entry.by), cycle(COLOURS), cycle(STYLES), strict=False
@@ -266,20 +311,15 @@ def front(entry: FigureEntry, title: str, runs: Values) -> Figure:
         axes.plot(*points.T, ".", color=colour, markersize=2, alpha=0.25, rasterized=True)
         line = {"color": colour, "linestyle": style, "label": name, "drawstyle": "steps-post"}
         axes.plot(*pareto_front(points).T, **line)
-    spread(axes.xaxis, is_logarithmic(runs[x]))
-    spread(axes.yaxis, is_logarithmic(runs[entry.y]))
+    _scale(axes.xaxis, is_logarithmic(runs[x]))
+    _scale(axes.yaxis, is_logarithmic(runs[entry.y]))
     axes.set(xlabel=runs.label(x), ylabel=runs.label(entry.y))
-    legend(figure)
+    _add_legend(figure)
     return figure
 
 
 def pareto_front(points: np.ndarray) -> np.ndarray:
-    """The points than which no other is smaller in both coordinates, the Pareto front.
-
-    Args:
-        points: (n, 2).
-
-    """
+    """Return the points, of (n, 2), that no other point beats in both coordinates."""
     points = points[np.lexsort(points.T[::-1])]
     lowest = np.minimum.accumulate(np.append(np.inf, points[:, 1]))
     front: np.ndarray = points[points[:, 1] < lowest[:-1]]
@@ -287,19 +327,19 @@ def pareto_front(points: np.ndarray) -> np.ndarray:
 
 
 def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
-    """A matrix for each part of the runs: a row for each value, a column for what moves it.
+    """Draw a matrix for each part of the runs: rows are the values shown, columns the x.
 
-    The colour is Spearman's rank correlation: 1 where more of the one always goes with more of the
-    other, -1 where it goes with less, 0 where it makes no difference.
+    Colours are Spearman's rank correlations: 1 if a value always grows with x, -1 if it falls, 0 if
+    it does neither.
     """
     parts = list(runs.parts(entry.by))
     height = max(_LINE * len(entry.show), _BAR / len(parts)) + _AROUND
-    figure, panels = make_panels(title, len(parts), 1, height, sharex=True)
+    figure, panels = _panels(title, len(parts), 1, height, sharex=True)
     has_gaps = False
     for axes, (name, part) in zip(panels.flat, parts, strict=True):
-        found = np.array([[_correlation(part[x], part[y]) for x in entry.x] for y in entry.show])
-        image = axes.imshow(found, cmap=_CORRELATIONS, vmin=-1.0, vmax=1.0, aspect="auto")
-        for (row, column), value in np.ndenumerate(found):
+        matrix = np.array([[_correlation(part[x], part[y]) for x in entry.x] for y in entry.show])
+        image = axes.imshow(matrix, cmap=_CORRELATIONS, vmin=-1.0, vmax=1.0, aspect="auto")
+        for (row, column), value in np.ndenumerate(matrix):
             if abs(value) >= _NOTHING:
                 colour = "white" if abs(value) > _DARK else "black"
                 axes.text(
@@ -311,16 +351,16 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
         axes.grid(visible=False)
         axes.set_facecolor(_EMPTY)
         axes.set_title(name)
-        has_gaps |= bool(np.isnan(found).any())
+        has_gaps |= bool(np.isnan(matrix).any())
     names = max(name.get_window_extent().height for name in axes.get_xticklabels()) / figure.dpi
     figure.set_figheight(figure.get_figheight() + max(0.0, names - _NAMES))
     figure.colorbar(image, ax=list(panels.flat), label="rank correlation")
-    legend(figure, *[_sample(_EMPTY, "one of the two is constant")] * has_gaps)
+    _add_legend(figure, *[_sample(_EMPTY, "one of the two is constant")] * has_gaps)
     return figure
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:
-    """Spearman's rank correlation of the runs that have both values; nan if one is constant."""
+    """Return Spearman's rank correlation of the runs with both values; nan if one is constant."""
     from scipy.stats import spearmanr  # noqa: PLC0415
 
     both = np.isfinite(x) & np.isfinite(y)
@@ -329,7 +369,7 @@ def _correlation(x: np.ndarray, y: np.ndarray) -> float:
     return float(spearmanr(x[both], y[both]).statistic)
 
 
-#: What draws each chart.
+#: Functions that draw the kinds of figures.
 _DRAW: Mapping[str, Callable[[FigureEntry, str, Values], Figure]] = {
     "bands": bands,
     "maps": maps,
@@ -339,48 +379,36 @@ _DRAW: Mapping[str, Callable[[FigureEntry, str, Values], Figure]] = {
 
 
 def figure_files(entries: Sequence[FigureEntry]) -> list[str]:
-    """The files that :func:`draw_figures` may write."""
+    """Return the names of all files that :func:`draw_figures` may write."""
     return [f"{file_name(entry.name)}.{ending}" for entry in entries for ending in FIGURE_FORMATS]
 
 
 def draw_figures(
-    entries: Sequence[FigureEntry],
-    title: str,
-    columns: Columns,
-    folder: Path,
-    legends: Mapping[str, str] | None = None,
-    units: Mapping[str, str] | None = None,
-    logarithmic: Mapping[str, bool] | None = None,
+    entries: Sequence[FigureEntry], title: str, runs: Values, folder: Path
 ) -> Iterator[str]:
-    """Draw the figures of a study, as PNG and SVG.
+    """Draw the figures of a study as PNG and SVG, and yield a note on each that was left out.
 
     Args:
-        entries: the figures to draw.
-        title: heading; empty where there is one beside the figures.
-        columns: of runs.parquet.
+        entries: figures to draw.
+        title: heading; empty if there is one next to the figures.
+        runs: of the study.
         folder: to write into.
-        legends: what the lines of scenarios are called.
-        units: of parameters, as FMUs write them.
-        logarithmic: whether the axes of values that are sampled are.
-
-    Yields:
-        What was left out, and why.
 
     """
-    for entry in [replace(entry, logarithmic=logarithmic or {}) for entry in entries]:
-        runs = Values(columns, entry.labels, legends, units).where(entry.where)
+    for entry in entries:
+        shown = replace(runs, labels=entry.labels).where(entry.where)
         values = (*entry.x, *([entry.y] if entry.y else ()), *entry.show)
-        lacking = [value for value in values if not np.isfinite(runs[value]).any()]
+        lacking = [value for value in values if not np.isfinite(shown[value]).any()]
         if lacking:
-            yield f"figure {entry.name} skipped: no run has {lacking[0]}"
+            yield f"figure {entry.name} left out: no run has {lacking[0]}"
             continue
-        if (parts := len(list(runs.parts(entry.by)))) > _MOST_PARTS:
+        if (parts := len(list(shown.parts(entry.by)))) > _MOST_PARTS:
             yield (
-                f"figure {entry.name} skipped: by splits the runs into {parts} parts, more than "
+                f"figure {entry.name} left out: by splits the runs into {parts} parts, more than "
                 f"{_MOST_PARTS}"
             )
             continue
-        only = ", ".join(runs.named(name, value) for name, value in entry.where.items())
+        only = ", ".join(shown.named(name, value) for name, value in entry.where.items())
         with styled():
-            figure = _DRAW[entry.chart](entry, ": ".join(filter(None, (title, only))), runs)
+            figure = _DRAW[entry.chart](entry, ": ".join(filter(None, (title, only))), shown)
         save(figure, *(folder / f"{file_name(entry.name)}.{ending}" for ending in FIGURE_FORMATS))

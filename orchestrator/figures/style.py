@@ -1,4 +1,4 @@
-"""How figures look, and what they are told of a run; nothing here needs matplotlib."""
+"""Colours, symbols and units of figures, and a run as figures take it; without matplotlib."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from typing import Any, NamedTuple
 from orchestrator.cosim import Table
 from orchestrator.vehicle.signals import STANDARD, Loop, Needs
 
-#: Okabe and Ito's colours, which stay apart for colour-blind eyes, darkest first; every line
-#: also has its own style, for print.
+#: Okabe and Ito's colours, darkest first, which the colour-blind can distinguish. For print, every
+#: line also has its own style.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 STYLES = ("-", "--", "-.", ":")
 REFERENCE = "#555555"
 
-#: Hues of more vehicles than there are colours: their lightnesses in turn, and their saturation.
+#: Alternating lightnesses, and saturation, of vehicles beyond the colours above.
 _LIGHTNESSES, _SATURATION = (0.32, 0.6), 0.75
 
-#: The hull of a vehicle, in shares of its length: distance behind the nose and radius of its rings.
+#: Rings of a vehicle's hull: distance from the nose and radius, in shares of its length.
 RINGS = ((0, 0), (0.02, 0.04), (0.08, 0.075), (0.18, 0.09), (0.7, 0.09), (0.9, 0.05), (1, 0.02))
 
-#: Corners of the upper fin: distance behind the nose, and height above the axis.
+#: Corners of the upper fin: distance from the nose, and height above the axis.
 FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
 
-#: Width of the page [in]: two columns of a journal, and a phone still shows its letters.
+#: Width of a figure [in]: two columns of a journal, and legible on a phone.
 FIGURE_WIDTH = 7.2
 
 SETTINGS: Any = {
@@ -53,11 +53,11 @@ SETTINGS: Any = {
     "legend.title_fontsize": "medium",
     "lines.linewidth": 1.4,
     "savefig.dpi": 200,
-    # Figures of the same run are the same file.
+    # Equal runs give equal files.
     "svg.hashsalt": "auv-fmu",
 }
 
-#: What may stand before an underscore in a heading: letters of the paper.
+#: Greek letters that may come before an underscore in a heading, and their names in LaTeX.
 _GREEK = {
     **{name: name for name in ("gamma", "lambda", "omega", "phi", "psi", "rho", "sigma", "tau")},
     **{name: name for name in ("alpha", "beta", "delta", "eta", "nu", "theta", "epsilon")},
@@ -66,7 +66,7 @@ _GREEK = {
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 _SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)(?!\w)")
 
-#: What figures are written as.
+#: Endings of the files of a figure.
 FIGURE_FORMATS = ("png", "svg")
 
 
@@ -74,10 +74,10 @@ class Drawn(NamedTuple):
     """A run in a figure.
 
     Attributes:
-        label: that tells it from others.
+        label: in legends.
         result: its rows.
-        z_up: whether z is up and y west where its path is drawn (reading 16); or down, and east.
-        loops: of its vehicles; the first is the one that is drawn.
+        z_up: if true, its path is drawn with z up and y west (reading 16), else down and east.
+        loops: of its vehicles; figures of one vehicle show the first.
 
     """
 
@@ -88,16 +88,16 @@ class Drawn(NamedTuple):
 
     @property
     def loop(self) -> Loop:
-        """The loop that is drawn."""
+        """The loop to draw."""
         return self.loops[0]
 
     def lacks(self, needs: Callable[[Loop], Needs]) -> list[str]:
-        """What of that which something needs is not there."""
+        """Return the columns and parameters of the loop that are needed and missing."""
         return self.result.missing(*needs(self.loop))
 
 
 def vehicle_colours(n: int) -> list[str]:
-    """A colour for each of n vehicles, all different; of more than seven, many are alike."""
+    """Return n different colours; beyond seven, many are similar."""
     colours = list(COLOURS[:n])
     more = n - len(colours)
     for i in range(more):
@@ -108,43 +108,43 @@ def vehicle_colours(n: int) -> list[str]:
 
 
 def reference_colours(loops: Sequence[Loop]) -> list[str]:
-    """The colour of each vehicle's reference: its own, or grey where several have the same."""
+    """Return the colour of each vehicle's reference: the vehicle's, or grey if several share it."""
     followed = Counter(loop.y_d for loop in loops)
     colours = zip(loops, vehicle_colours(len(loops)), strict=True)
     return [REFERENCE if followed[loop.y_d] > 1 else colour for loop, colour in colours]
 
 
 def earth_axes(z_up: bool) -> tuple[str, str, str]:
-    """Titles of the axes x, y and z of a path."""
+    """Return the labels of the axes x, y and z of a path."""
     if z_up:
         return "x north [m]", "y west [m]", "z up [m]"
     return "x north [m]", "y east [m]", "z down [m]"
 
 
 def runs_with(runs: Sequence[Drawn], needs: Callable[[Loop], Needs]) -> Iterator[tuple[Drawn, str]]:
-    """The runs that have what is needed, each with its own colour whichever others have."""
+    """Yield the runs that have what is needed; their colours do not depend on the other runs."""
     for run, colour in zip(runs, cycle(COLOURS), strict=False):
         if not run.lacks(needs):
             yield run, colour
 
 
 def printed_unit(unit: str) -> str:
-    """A unit of FMI's as it is printed: N.m as N·m, m/s2 as m/s²."""
+    """Return a unit of FMI in print: N.m as N·m, m/s2 as m/s²."""
     text = unit.replace("s^1/2", "√s").replace(".", "·")
     return re.sub(r"(?<=[A-Za-z])\d+", lambda power: power[0].translate(_RAISED), text)
 
 
 def escape_math(text: str) -> str:
-    """Escape what matplotlib would take for a formula."""
+    """Escape the dollar signs that would make matplotlib set a formula."""
     return text.replace("$", r"\$")
 
 
 def heading(title: str) -> str:
-    """A title whose symbols such as A_f and theta_hat are set as such, and the rest as it is."""
-    return _SYMBOL.sub(_set, escape_math(title))
+    """Return a title for matplotlib with symbols such as A_f and theta_hat as formulas."""
+    return _SYMBOL.sub(_formula, escape_math(title))
 
 
-def _set(symbol: re.Match[str]) -> str:
+def _formula(symbol: re.Match[str]) -> str:
     base, index = symbol.groups()
     letter = rf"\{_GREEK[base]}" if base in _GREEK else base
     return rf"$\hat{{{letter}}}$" if index == "hat" else rf"${letter}_{{{index}}}$"

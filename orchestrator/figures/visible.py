@@ -1,4 +1,4 @@
-"""What can be seen of a run: the rows that matter, and of noise or chatter its mean."""
+"""The rows of a run that are visible in a figure, and the mean of signals that chatter."""
 
 from __future__ import annotations
 
@@ -15,30 +15,30 @@ from orchestrator.vehicle.signals import STANDARD
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-#: Runs of no more rows than this are kept whole.
+#: Runs of up to so many rows are kept whole.
 _WHOLE = 20_000
 
-#: Times into which a longer run is divided, at least, and less than twice as many at most.
+#: Least number of divisions of a longer run; there are less than twice as many.
 _DIVISIONS = 200
 
-#: A signal chatters if it turns around at more than this share of its rows ...
+#: A signal chatters if it changes direction at more than this share of its rows.
 _TURNS = 0.2
 
-#: ... by more than this share of its range.
+#: Changes below this share of the signal's range do not count.
 _NEGLIGIBLE = 1e-3
 
-#: A mean is taken over this share of a run.
+#: Window of a moving mean, as a share of the run.
 _WINDOW = 0.01
 
-#: Times and values of a signal, linear in the rows of the table that it is taken from.
+#: Returns times and values of a signal, linear in the rows of a table.
 Signal = Callable[[Table], tuple[np.ndarray, np.ndarray]]
 
 
 class _Division(NamedTuple):
-    """What is kept of a part of a run.
+    """A part of a run, thinned out.
 
     Attributes:
-        pairs: rows with extremes, and the first and the last, each after the row before it,
+        pairs: rows with extremes, and the first and the last row, each with the row before it:
             (n, 2, 1 + columns).
         integral: of the rows over time, linear between them.
 
@@ -49,34 +49,29 @@ class _Division(NamedTuple):
 
     @property
     def mean(self) -> np.ndarray:
-        """The mean row, at the time at which the division ends."""
+        """The mean row, with the end of the division as its time."""
         start, end = self.pairs[0, 0, 0], self.pairs[-1, 1, 0]
         return np.append(end, self.integral[1:] / (end - start))
 
 
 class VisibleRows(Table):
-    """An observer that keeps the rows that can be seen, so that figures of long runs cost no more.
+    """An observer that keeps the rows that are visible in a figure.
 
-    Of each division of the time it keeps the rows in which one of the drawn signals is smallest or
-    largest, so the envelope of noise and chatter stays, and with each row the one before it, so
-    that steps stay whole. Neighbouring divisions are merged when there are too many. So memory does
-    not grow with the length of the run, and its length need not be known before.
+    In each division of the time it keeps the rows with the extremes of the watched signals, which
+    are the envelope of noise and chatter, and the row before each of them, so that steps stay
+    steps. Neighbouring divisions are merged when there are too many: memory does not grow with the
+    length of the run, which need not be known in advance.
 
     Attributes:
-        whole_header: of the run, with columns of texts, of which nothing is seen.
-        means: of a longer run, for the rows that are kept are its extremes and no sample of it: a
-            row at the start, and at the end of each division the mean over it of all signals,
-            linear between their rows. None: all rows are kept.
+        whole_header: of the run, including columns of texts, which are not kept.
+        means: of a longer run, whose kept rows have another mean: a row at the start and, at the
+            end of each division, the mean of all signals over it, linear between rows. None: all
+            rows are kept.
 
     """
 
     def __init__(self, watched: Collection[str] = STANDARD.drawn()) -> None:
-        """Start without rows.
-
-        Args:
-            watched: columns whose extremes are kept.
-
-        """
+        """Start without rows; the extremes of the watched columns will be kept."""
         super().__init__()
         self._watched_names = watched
         self.whole_header = self.header
@@ -96,8 +91,8 @@ class VisibleRows(Table):
         self._per_division, self._in_last = _WHOLE // _DIVISIONS, 0
 
     def take(self, rows: np.ndarray) -> None:
-        """Keep what can be seen of some rows."""
-        # An integer of 64 bits is drawn as a double.
+        """Keep the visible ones of some rows."""
+        # 64-bit integers are drawn as doubles.
         rows = self.whole_header.numeric(rows)
         if self._divisions:
             rows = np.vstack((self._last, rows))
@@ -129,39 +124,36 @@ class VisibleRows(Table):
             self._divisions = []
 
     def _add(self, pairs: np.ndarray) -> None:
-        """Put rows, each after the one before it, into the last division, or into a new one."""
+        """Add pairs of successive rows to the last division, or to a new one."""
         n = len(pairs)
         areas = 0.5 * np.diff(pairs[:, :, 0], axis=1) * pairs.sum(axis=1)
         if self._in_last:
-            # Row by row, so that the means do not depend on the blocks in which rows come.
-            begun = self._divisions.pop()
-            pairs = np.concatenate((begun.pairs, pairs))
-            areas = np.vstack((begun.integral, areas))
+            # Row by row, so that the means do not depend on the sizes of blocks.
+            last = self._divisions.pop()
+            pairs = np.concatenate((last.pairs, pairs))
+            areas = np.vstack((last.integral, areas))
         self._divisions.append(_Division(self._extremes(pairs), areas.sum(axis=0)))
         self._in_last = (self._in_last + n) % self._per_division
         if not self._in_last and len(self._divisions) == 2 * _DIVISIONS:
-            halves = self._divisions[::2], self._divisions[1::2]
-            self._divisions = list(map(self._merged, *halves))
+            halves = zip(self._divisions[::2], self._divisions[1::2], strict=True)
+            self._divisions = [
+                _Division(
+                    self._extremes(np.concatenate((one.pairs, other.pairs))),
+                    one.integral + other.integral,
+                )
+                for one, other in halves
+            ]
             self._per_division *= 2
 
-    def _merged(self, one: _Division, next_one: _Division) -> _Division:
-        pairs = np.concatenate((one.pairs, next_one.pairs))
-        return _Division(self._extremes(pairs), one.integral + next_one.integral)
-
     def _extremes(self, pairs: np.ndarray) -> np.ndarray:
-        """The pairs with a smallest or largest watched value in their second row, and the ends."""
+        """Return the first and last pair, and those with a watched extreme in their second row."""
         watched = pairs[:, 1, self._watched]
-        found = {0, len(pairs) - 1, *watched.argmin(axis=0), *watched.argmax(axis=0)}
-        return pairs[sorted(found)]
+        kept = {0, len(pairs) - 1, *watched.argmin(axis=0), *watched.argmax(axis=0)}
+        return pairs[sorted(kept)]
 
 
 def draw_signal(axes: Axes, table: Table, signal: Signal, **line: Any) -> bool:
-    """A line; of a signal that chatters a pale one, and its mean upon it.
-
-    Returns:
-        Whether there is a mean.
-
-    """
+    """Draw a signal; if it chatters, as a pale band with its mean on top, and return true."""
     time, values = signal(table)
     if not chatters(values):
         axes.plot(time, values, **line)
@@ -169,7 +161,7 @@ def draw_signal(axes: Axes, table: Table, signal: Signal, **line: Any) -> bool:
     # Below all lines, whichever is drawn first.
     axes.plot(time, values, color=line["color"], linewidth=0.5, alpha=0.35, zorder=1.5)
     if isinstance(table, VisibleRows) and table.means is not None:
-        # Extremes have another mean; means hold from the end of a division to the end of the next.
+        # The kept rows have another mean. Means hold from the end of a division to the next.
         ends, means = signal(table.means)
         time = np.repeat(np.append(table.time[0], ends), 2)[1:-1]
         values = np.repeat(means, 2)
@@ -178,12 +170,12 @@ def draw_signal(axes: Axes, table: Table, signal: Signal, **line: Any) -> bool:
 
 
 def mean_window(time: np.ndarray) -> float:
-    """How long the means are taken over [s]."""
+    """Return the window of moving means [s]."""
     return _WINDOW * float(np.ptp(time))
 
 
 def chatters(values: np.ndarray) -> bool:
-    """Whether a signal turns around so often that its line would be a smear."""
+    """Return true if a signal changes direction so often that its line would be a smear."""
     steps = np.diff(values)
     steps = steps[np.abs(steps) > _NEGLIGIBLE * np.ptp(values)]
     turns = np.count_nonzero(steps[1:] * steps[:-1] < 0.0)
@@ -191,9 +183,9 @@ def chatters(values: np.ndarray) -> bool:
 
 
 def moving_mean(time: np.ndarray, values: np.ndarray, window: float) -> np.ndarray:
-    """Mean of a signal, linear between its rows, over a window around each of its times [s].
+    """Return the mean of a signal, linear between rows, over a window [s] around each row.
 
-    Rows need not be equally far apart; at the ends of the run the window is cut off.
+    The window is cut off at the ends of the run; rows need not be equally spaced.
     """
     steps = np.diff(time)
     integral = np.concatenate(([0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * steps)))

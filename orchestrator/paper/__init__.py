@@ -1,1 +1,1 @@
-"""The paper's numbers and claims beside ours; `report` puts them together."""
+"""The paper's numbers and claims compared with ours, in a report."""

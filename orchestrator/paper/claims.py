@@ -1,12 +1,12 @@
-"""Every printed number and claim of section 4 that a simulation can check, and its measures.
+"""Printed numbers and claims of section 4 that a simulation can check.
 
-A claim is a function of the runs that are named beside it. The report makes these runs, calls every
-claim, and prints the findings in the order of this file.
+A claim is a function of the runs in its decorator. The report makes the runs, and prints the
+findings in the order of this file.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
 from typing import Any, NamedTuple
@@ -19,11 +19,10 @@ from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import theorem
 from orchestrator.cosim import Table
-from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.paper.page import actuator_values, numbers
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.index.tracking import REACHED
-from orchestrator.vehicle.signals import STANDARD, applied, real_parameter
+from orchestrator.vehicle.signals import STANDARD, Loop, applied, real_parameter
 
 #: Control efforts of section 4.2, in the order u, q, r.
 EFFORT_PROPOSED, EFFORT_PD = (130.0, 40.0, 53.0), (235.0, 163.0, 172.0)
@@ -34,7 +33,7 @@ FINAL_ERROR_PROPOSED, FINAL_ERROR_PD = (0.01, 0.02, 0.06), (0.004, 0.001, 0.001)
 #: Turning radius of section 4.1 [m].
 TURNING_RADIUS = 0.6
 
-#: The runs of the figures, and what the claims change in them.
+#: Runs of the figures, some with other parameters.
 FIVE, FIVE_PD = Request("fig5"), Request("fig5-pd")
 SIX, SIX_PD = Request("fig6"), Request("fig6-pd")
 SEVEN = (Request("fig7a"), Request("fig7b"), Request("fig7c"))
@@ -42,28 +41,45 @@ QUIET = Request("fig4", {"plant.noise.std": 0.0})
 SHARP = Request("fig5", {"controller.eps_t": 1.0})
 TURNING = Request("fig3b", {"plant.tau.u": 80.0, "plant.tau.q": 0.0, "plant.tau.r": 80.0})
 
-#: The noise of our Fig. 4 [m], and the seeds of its draws.
+#: Noise of our Fig. 4 [m], and seeds of its draws.
 _NOISE, _SEEDS = 0.001, range(1, 6)
 _WITH_NOISE = f"with noise of {1e3 * _NOISE:g} mm"
 
-#: A signal that is squared and integrated.
+#: Factor in the unit of the L2 norm of a signal.
 _SQUARED = "·√s"
 
 
 def noisy(request: Request) -> tuple[Request, ...]:
-    """A run with noise, once for each seed."""
+    """Return a run with noise, once for each seed."""
     noise = ({"plant.noise.std": _NOISE, "plant.noise.seed": seed} for seed in _SEEDS)
-    return tuple(replace(request, parameters={**request.parameters, **one}) for one in noise)
+    return tuple(replace(request, parameters={**request.parameters, **draw}) for draw in noise)
+
+
+@dataclass(frozen=True)
+class KeptRun:
+    """The part of a run that the report needs.
+
+    Attributes:
+        metrics: as in metrics.json; only `failure` for a run that could not be made.
+        table: the visible rows, which are all rows of a run of the paper.
+        loops: of its vehicles.
+        label: the command that makes it, without `auv-fmu run`.
+
+    """
+
+    metrics: Mapping[str, Any]
+    table: Table
+    loops: Sequence[Loop] = (STANDARD,)
+    label: str = ""
+
+    @property
+    def failure(self) -> str | None:
+        """Reason why the run ended early, or was not made."""
+        return self.metrics.get("failure")
 
 
 class Finding(NamedTuple):
-    """The answer of our runs to a claim.
-
-    Attributes:
-        ours: their numbers.
-        verdict: agreement with the paper, in words.
-
-    """
+    """Our numbers for a claim, and whether they agree with the paper, in words."""
 
     ours: str
     verdict: str
@@ -74,10 +90,10 @@ class Claim:
     """A number or statement of the paper.
 
     Attributes:
-        title: its place in the paper and its subject.
-        published: the number or statement in the paper.
-        runs: the runs that judge it.
-        judge: a function of these runs.
+        title: place in the paper and subject.
+        published: number or statement of the paper.
+        runs: that it is compared with.
+        judge: function of these runs.
 
     """
 
@@ -87,7 +103,7 @@ class Claim:
     judge: Callable[..., Finding]
 
     def finding(self, kept_runs: Sequence[KeptRun]) -> Finding:
-        """Judge the claim by its runs."""
+        """Compare the claim with its runs."""
         for kept_run in kept_runs:
             if kept_run.failure is not None:
                 return Finding(f"a run ended early: {kept_run.failure}", "none")
@@ -101,7 +117,7 @@ CLAIMS: list[Claim] = []
 def claim(
     title: str, published: str, *runs: Request
 ) -> Callable[[Callable[..., Finding]], Callable[..., Finding]]:
-    """Register the judge of a claim; of several above a function, the lowest comes first."""
+    """Register the judge of a claim; of several decorators, the lowest comes first."""
 
     def register(judge: Callable[..., Finding]) -> Callable[..., Finding]:
         CLAIMS.append(Claim(title, published, runs, judge))
@@ -110,27 +126,26 @@ def claim(
     return register
 
 
-def said(holds: object) -> str:
-    """The verdict for a claim that holds, or does not."""
+def _verdict(holds: object) -> str:
     return "agrees" if holds else "**differs**"
 
 
 def ratio(ours: Sequence[float], published: Sequence[float]) -> str:
-    """Our numbers in parts of the published ones."""
+    """Return our numbers divided by the published ones."""
     return f"ratio {numbers(np.divide(ours, published).tolist())}"
 
 
 def sum_without_step(l2: Any, duration: Any, h: float) -> Any:
-    """(59) coded as sqrt(sum of tau_k^2 / T_f), from the L2 norm sqrt(sum of h tau_k^2)."""
+    """Return (59) coded as sqrt(sum of tau_k^2 / T_f), from the norm sqrt(sum of h tau_k^2)."""
     return l2 / np.sqrt(h * duration)
 
 
 class Approach(NamedTuple):
-    """The vehicle's way to the reference.
+    """The vehicle's approach to the reference.
 
     Attributes:
-        duration: until |e| is at most :data:`REACHED` [s].
-        impulse: of the surge force, as applied in that time [N.s].
+        duration: until |e| is at most :data:`.REACHED` [s].
+        impulse: of the applied surge force in that time [N.s].
 
     """
 
@@ -139,23 +154,23 @@ class Approach(NamedTuple):
 
     @property
     def least_effort(self) -> float:
-        """The least L2 norm that a force with this impulse can have in this time [N.s^0.5].
+        """The least L2 norm of any force with this impulse in this time [N.s^0.5].
 
-        (integral of tau)^2 <= T * integral of tau^2 by Cauchy and Schwarz, whatever its course.
+        (integral of tau)^2 <= T * integral of tau^2 by Cauchy and Schwarz.
         """
         return abs(self.impulse) / sqrt(self.duration)
 
     def contradicts_until(self, effort: float, h: float) -> float:
-        """The T_f before which :func:`sum_without_step` cannot be as small as an effort [s]."""
+        """Return the T_f [s] below which :func:`sum_without_step` exceeds an effort."""
         return (self.least_effort / effort) ** 2 / h
 
     def soonest(self, effort: float) -> float:
-        """The least time in which a force of an L2 norm [N.s^0.5] can have this impulse [s]."""
+        """Return the least time [s] in which a force with an L2 norm [N.s^0.5] has this impulse."""
         return (self.impulse / effort) ** 2
 
 
 def errors(table: Table) -> np.ndarray:
-    """e of all rows at once, far sooner than :func:`.tracking_error` and equal up to rounding."""
+    """Return e of all rows: :func:`.tracking_error`, much faster and equal up to rounding."""
     _, theta, psi = table.group(*STANDARD.attitude).T
     ahead = np.cos(theta) * np.cos(psi), np.cos(theta) * np.sin(psi), -np.sin(theta)
     y = table.group(*STANDARD.position) + real_parameter(table, STANDARD.ell) * np.column_stack(
@@ -166,7 +181,7 @@ def errors(table: Table) -> np.ndarray:
 
 
 def approach_of(table: Table) -> Approach | None:
-    """The way of a run to its reference; None if it does not come there, or is there already."""
+    """Return the approach of a run; None if it never arrives, or starts at the reference."""
     near = np.linalg.norm(errors(table), axis=1) <= REACHED
     first = int(near.argmax())
     if not near[first] or not first:
@@ -176,25 +191,25 @@ def approach_of(table: Table) -> Approach | None:
 
 
 def turning_radius(table: Table) -> float:
-    """Radius of the level circle that the centre of mass ends on [m]."""
+    """Return the radius of the level circle of the centre of mass at the end of a run [m]."""
     u, v, r = (table[f"plant.nu.{k}"][-1] for k in "uvr")
     return float(np.hypot(u, v) / abs(r))
 
 
 def total_variation_until(table: Table, stop_time: float) -> np.ndarray:
-    """Sum of |difference| of each applied signal up to a time, in the order u, q, r."""
+    """Return the sum of |difference| of each applied signal up to a time, in the order u, q, r."""
     signal = applied(table)[table.time[1:] <= stop_time]
     variation: np.ndarray = np.abs(np.diff(signal, axis=0)).sum(axis=0)
     return variation
 
 
 def largest_error_after(table: Table, start: float) -> float:
-    """Largest tracking error of any axis after a time [m]; zero for a shorter run."""
+    """Return the largest tracking error of any axis after a time [m]; 0 for a shorter run."""
     return float(np.abs(errors(table)[table.time > start]).max(initial=0.0))
 
 
 def largest_estimate(table: Table) -> float:
-    """Largest component of theta_hat in a run."""
+    """Return the largest component of theta_hat in a run."""
     return float(table.step_values(*STANDARD.theta_hat).max())
 
 
@@ -207,9 +222,9 @@ def turning(run: KeptRun) -> Finding:
     radius = turning_radius(run.table)
     return Finding(
         f"{radius:.2f} m; its diameter {2 * radius:.3f} m",
-        f"{said(abs(radius / TURNING_RADIUS - 1.0) < 0.1)}, ratio {radius / TURNING_RADIUS:.2f}: "
-        f"this is the radius that the printed equations give (reading 11). The diameter rounds to "
-        f"{2 * radius:.1f} m",
+        f"{_verdict(abs(radius / TURNING_RADIUS - 1.0) < 0.1)}, ratio "
+        f"{radius / TURNING_RADIUS:.2f}: this is the radius that the printed equations give "
+        f"(reading 11). The diameter rounds to {2 * radius:.1f} m",
     )
 
 
@@ -217,7 +232,7 @@ def turning(run: KeptRun) -> Finding:
 def no_saturation(quiet: KeptRun) -> Finding:
     return Finding(
         f"peaks {actuator_values(quiet.metrics['peak_command'])} of 80",
-        said(not any(quiet.metrics["saturated_fraction"])),
+        _verdict(not any(quiet.metrics["saturated_fraction"])),
     )
 
 
@@ -238,24 +253,24 @@ def no_saturation_with_noise(*runs: KeptRun) -> Finding:
     return Finding(
         f"largest peaks of {len(_SEEDS)} draws {peaks}; at most {share:.2g} % of the steps of a "
         "draw saturate",
-        f"{said(share == 0.0)}; in longer runs they do (reading 7)",
+        f"{_verdict(share == 0.0)}; in longer runs they do (reading 7)",
     )
 
 
 @claim("Fig. 4: the tracking errors converge to a neighbourhood of the origin", "no numbers", QUIET)
 def convergence(quiet: KeptRun) -> Finding:
     error = quiet.metrics["final_error"]
-    return Finding(f"e_f {numbers(error)} m", said(max(error) < 0.1))
+    return Finding(f"e_f {numbers(error)} m", _verdict(max(error) < 0.1))
 
 
 @claim("Fig. 4: the estimated parameters are bounded", "no numbers", QUIET)
 def bounded_estimates(quiet: KeptRun) -> Finding:
-    """A run of finite length can only fail to contradict this."""
+    """Check that no estimate is infinite: a finite run can show no more."""
     largest = largest_estimate(quiet.table)
     return Finding(
         f"largest {largest:.3g}, still growing at {quiet.table.time[-1]:g} s; (22) cannot exceed "
         "max(G |r|) / sigma",
-        said(np.isfinite(largest)),
+        _verdict(np.isfinite(largest)),
     )
 
 
@@ -290,7 +305,7 @@ def effort_as_printed(five: KeptRun, pd: KeptRun) -> Finding:
     holds = np.allclose(proposed, EFFORT_PROPOSED, rtol=0.5)
     return Finding(
         f"{actuator_values(proposed)}, and {actuator_values(baseline)}",
-        f"{said(holds)}: an RMS of signals within 80 cannot exceed 80 (reading 6)",
+        f"{_verdict(holds)}: an RMS of signals within 80 cannot exceed 80 (reading 6)",
     )
 
 
@@ -301,7 +316,7 @@ def effort_as_printed(five: KeptRun, pd: KeptRun) -> Finding:
     FIVE_PD,
 )
 def effort_as_a_sum(five: KeptRun, pd: KeptRun) -> Finding:
-    """It falls with T_f, which is not given."""
+    """Compare with a sum that falls with T_f, which the paper does not give."""
     proposed, baseline = (
         sum_without_step(
             np.array(run.metrics["l2_effort"]), run.metrics["stop_time"], run.metrics["step"]
@@ -322,25 +337,25 @@ def effort_as_a_sum(five: KeptRun, pd: KeptRun) -> Finding:
     FIVE_PD,
 )
 def effort_of_the_way(five: KeptRun, pd: KeptRun) -> Finding:
-    """No course of the force gives that impulse in that time with the printed L2 norm."""
-    approaches = [found for run in (five, pd) if (found := approach_of(run.table))]
+    """Compare the printed L2 norms with the least ones of any force with the same impulse."""
+    approaches = [approach for run in (five, pd) if (approach := approach_of(run.table))]
     published = EFFORT_PROPOSED[0], EFFORT_PD[0]
     if len(approaches) < len(published):
         return Finding(f"|e| does not come to {REACHED:g} m", "none")
-    least = [found.least_effort for found in approaches]
+    least = [approach.least_effort for approach in approaches]
     pairs = list(zip(approaches, published, strict=True))
-    soonest = [found.soonest(effort) for found, effort in pairs]
+    soonest = [approach.soonest(effort) for approach, effort in pairs]
     took = ", and ".join(
-        f"{found.impulse:.4g} N·s in {found.duration:.3g} s" for found in approaches
+        f"{approach.impulse:.4g} N·s in {approach.duration:.3g} s" for approach in approaches
     )
     step = five.table.header.experiment.step
-    free = [found.contradicts_until(effort, step) for found, effort in pairs]
+    free = [approach.contradicts_until(effort, step) for approach, effort in pairs]
     return Finding(
         f"{took}, until |e| is {REACHED:g} m: not below {numbers(least)} N{_SQUARED} "
         "(Cauchy-Schwarz inequality)",
-        f"{said(all(np.less_equal(least, published)))}: the printed L2 norms give these impulses "
-        f"in {numbers(soonest)} s at the soonest. As sums without the step they contradict nothing "
-        f"from T_f = {numbers(free)} s on",
+        f"{_verdict(all(np.less_equal(least, published)))}: the printed L2 norms give these "
+        f"impulses in {numbers(soonest)} s at the soonest. As sums without the step they "
+        f"contradict nothing from T_f = {numbers(free)} s on",
     )
 
 
@@ -367,7 +382,7 @@ def proposed_does_not_saturate(five: KeptRun, sharp: KeptRun) -> Finding:
     runs = (five.metrics, sharp.metrics)
     return Finding(
         "peaks " + ", and ".join(actuator_values(run["peak_command"]) for run in runs),
-        said(not any(any(run["saturated_fraction"]) for run in runs)),
+        _verdict(not any(any(run["saturated_fraction"]) for run in runs)),
     )
 
 
@@ -376,7 +391,7 @@ def pd_saturates(pd: KeptRun) -> Finding:
     shares = [100 * share for share in pd.metrics["saturated_fraction"]]
     return Finding(
         f"{numbers(shares)} % of the steps, peaks {actuator_values(pd.metrics['peak_command'])}",
-        said(all(shares)),
+        _verdict(all(shares)),
     )
 
 
@@ -399,14 +414,14 @@ def pd_chatters(five: KeptRun, pd: KeptRun) -> Finding:
 def pd_chatters_with_noise(*runs: KeptRun) -> Finding:
     variations = np.array([run.metrics["total_variation"] for run in runs])
     proposed, baseline = np.median(variations.reshape(2, len(_SEEDS), -1), axis=1).tolist()
-    found = _rougher(baseline, proposed)
-    return found._replace(ours=f"{found.ours}, medians of {len(_SEEDS)} draws")
+    finding = _rougher(baseline, proposed)
+    return finding._replace(ours=f"{finding.ours}, medians of {len(_SEEDS)} draws")
 
 
 def _rougher(rough: Sequence[float], smooth: Sequence[float]) -> Finding:
     return Finding(
         f"total variation {actuator_values(rough)} against {actuator_values(smooth)}",
-        f"{said(np.greater(rough, smooth).all())}, {ratio(rough, smooth)}",
+        f"{_verdict(np.greater(rough, smooth).all())}, {ratio(rough, smooth)}",
     )
 
 
@@ -418,14 +433,14 @@ def _rougher(rough: Sequence[float], smooth: Sequence[float]) -> Finding:
 )
 def pd_is_accurate(five: KeptRun, pd: KeptRun) -> Finding:
     times = np.divide(five.metrics["final_error"], pd.metrics["final_error"])
-    return Finding(f"{numbers(times.tolist())} times", said((times > 1.0).all()))
+    return Finding(f"{numbers(times.tolist())} times", _verdict((times > 1.0).all()))
 
 
 @claim("Fig. 6: from 100 m the PD controller chatters severely", "severe chattering", SIX, SIX_PD)
 def pd_chatters_severely(six: KeptRun, pd: KeptRun) -> Finding:
     proposed, baseline = (total_variation_until(run.table, 60.0).tolist() for run in (six, pd))
-    found = _rougher(baseline, proposed)
-    return found._replace(ours=f"{found.ours} in the first 60 s")
+    finding = _rougher(baseline, proposed)
+    return finding._replace(ours=f"{finding.ours} in the first 60 s")
 
 
 @claim(
@@ -441,7 +456,7 @@ def smoother_and_less_accurate(sharp: KeptRun, five: KeptRun) -> Finding:
     return Finding(
         f"total variation from {actuator_values(rough)} to {actuator_values(smooth)}, largest e_f "
         f"from {exact:.3g} to {inexact:.3g} m",
-        said(np.greater(rough, smooth).all() and exact < inexact),
+        _verdict(np.greater(rough, smooth).all() and exact < inexact),
     )
 
 
@@ -460,7 +475,7 @@ def more_effort(*sevens: KeptRun) -> Finding:
         f"L2 effort {', then '.join(actuator_values(effort, _SQUARED) for effort in efforts)}; "
         f"largest estimate {numbers(estimates)}; total variation "
         f"{', then '.join(map(actuator_values, variations))}",
-        said((grown >= 0.0).all()),
+        _verdict((grown >= 0.0).all()),
     )
 
 
@@ -473,7 +488,7 @@ def intolerable_chattering(largest: KeptRun) -> Finding:
     saturates = any(largest.metrics["saturated_fraction"])
     return Finding(
         f"peaks of (c) {actuator_values(largest.metrics['peak_command'])} of 80",
-        said(True)
+        _verdict(True)
         if saturates
         else "**not seen** in Fig. 7: at the largest disturbance it shows, without noise, every "
         "command stays within the limits",
@@ -483,7 +498,7 @@ def intolerable_chattering(largest: KeptRun) -> Finding:
 @claim("Fig. 7: the performance degrades gradually", "errors grow from (a) to (c)", *SEVEN)
 def gradual_degradation(*sevens: KeptRun) -> Finding:
     errors = [max(run.metrics["final_error"]) for run in sevens]
-    return Finding(f"largest e_f {numbers(errors)} m", said((np.diff(errors) > 0).all()))
+    return Finding(f"largest e_f {numbers(errors)} m", _verdict((np.diff(errors) > 0).all()))
 
 
 @claim(
@@ -496,19 +511,19 @@ def gradual_degradation_on_the_way(*sevens: KeptRun) -> Finding:
     return Finding(
         f"{numbers(errors)} m, when the waves turn at 72 s; 0.2 m holds for e_f, and in (a) "
         "throughout",
-        said(errors == sorted(errors)),
+        _verdict(errors == sorted(errors)),
     )
 
 
 @claim("Theorem 1: the gains of section 4.1 meet (30) to (32)", "not stated")
 def gains_meet_the_conditions() -> Finding:
-    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
-    verdicts = [condition.verdict for condition in found.conditions]
-    first, second, _ = found.conditions
+    result = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
+    verdicts = [condition.verdict for condition in result.conditions]
+    first, second, _ = result.conditions
     return Finding(
         f"{', '.join(verdicts)}: (30) {first.left:g}, needed above {first.right:g}; (31) "
         f"{second.left:g}, needed above {second.right + second.least:.4g}",
-        f"{said('violated' not in verdicts)} (reading 10); `auv-fmu gains`",
+        f"{_verdict('violated' not in verdicts)} (reading 10); `auv-fmu gains`",
     )
 
 
@@ -517,11 +532,11 @@ def gains_meet_the_conditions() -> Finding:
     "arbitrarily large",
 )
 def region_is_arbitrarily_large() -> Finding:
-    found = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
-    least, there = found.zeta_of_any_gains, found.bounds.lambda_d2
+    result = theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
+    least, lambda_d2 = result.zeta_of_any_gains, result.bounds.lambda_d2
     return Finding(
         f"as printed, (31) asks with any gains for more than {least:.4g} of lambda_d2, which is "
-        f"{there:g}; (42) holds for |x| < {found.x_of_any_gains:.2g} at most",
-        f"{said(least < there)}: no gain enters alpha_3 with a positive sign "
+        f"{lambda_d2:g}; (42) holds for |x| < {result.x_of_any_gains:.2g} at most",
+        f"{_verdict(least < lambda_d2)}: no gain enters alpha_3 with a positive sign "
         "([the proof](#the-region-of-attraction-does-not-grow-with-the-gains))",
     )

@@ -1,4 +1,4 @@
-"""Effects that the paper does not show, each a function of the runs that are named beside it."""
+"""Effects that the paper does not show, each a function of the runs in its decorator."""
 
 from __future__ import annotations
 
@@ -14,23 +14,30 @@ from numpy.typing import ArrayLike
 
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.output_feedback import Gains
-from orchestrator.figures.drawing import name_runs, overlay, save, styled
-from orchestrator.figures.panels import draw_commands
+from orchestrator.figures.drawing import name_runs, one_figure, save, styled
+from orchestrator.figures.run_figures import draw_commands
 from orchestrator.figures.style import COLOURS, FIGURE_WIDTH, STYLES, Drawn
-from orchestrator.paper.claims import EFFORT_PD, EFFORT_PROPOSED, FIVE, FIVE_PD, QUIET, SEVEN
-from orchestrator.paper.kept_runs import KeptRun
+from orchestrator.paper.claims import (
+    EFFORT_PD,
+    EFFORT_PROPOSED,
+    FIVE,
+    FIVE_PD,
+    QUIET,
+    SEVEN,
+    KeptRun,
+)
 from orchestrator.paper.page import actuator_values, escape_markdown, numbers, picture
 from orchestrator.runs.request import Request
 from orchestrator.vehicle.proof import CERTIFICATE_COLUMNS, certificates
 from orchestrator.vehicle.signals import ACTUATORS, AXES, limits
 
-#: Levels of measurement noise to show the effect of [m].
+#: Levels of measurement noise [m].
 NOISE_LEVELS = (0.0, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
 
-#: Steps to show the effect of [s]; section 4.1 has the first.
+#: Steps [s]; section 4.1 has the first.
 STEPS = (STEP, 0.01, 0.005, 0.002)
 
-#: Values of lambda to show the effect of [m/s]; section 4.1 has the second.
+#: Values of lambda [m/s]; section 4.1 has the second.
 LAMBDAS = (0.5, 1.0, 1.5, 2.1, 3.0, 4.0)
 
 #: Names of the actuators' signals in figures.
@@ -56,19 +63,19 @@ _STEPPED = (
 _ALGEBRAIC = replace(QUIET, parameters={**QUIET.parameters, "controller.saturation": "algebraic"})
 
 
-#: An effect in words and in a figure.
+#: Text and figure of an effect.
 Shown = tuple[str, Figure]
 
 
 @dataclass(frozen=True)
 class Effect:
-    """Something that runs show when they are compared.
+    """An effect that a comparison of runs shows.
 
     Attributes:
         name: of the figure's file.
         title: of the section.
-        runs: that are compared.
-        show: says and draws what they show.
+        runs: to compare.
+        show: returns text and figure.
 
     """
 
@@ -85,7 +92,7 @@ EFFECTS: list[Effect] = []
 def effect(
     name: str, title: str, *runs: Request
 ) -> Callable[[Callable[..., Shown]], Callable[..., Shown]]:
-    """Register a function of some kept runs as an effect."""
+    """Register a function of kept runs as an effect."""
 
     def register(show: Callable[..., Shown]) -> Callable[..., Shown]:
         EFFECTS.append(Effect(name, title, runs, show))
@@ -95,28 +102,21 @@ def effect(
 
 
 def show_effect(name: str, kept_runs: Sequence[KeptRun], folder: Path) -> str:
-    """Draw the figure of an effect and give its text; a task for a worker.
-
-    Args:
-        name: of the effect.
-        kept_runs: that it shows.
-        folder: to write `NAME.png` into.
-
-    """
+    """Write `NAME.png` of an effect into a folder and return its text; a task for a worker."""
     for kept_run in kept_runs:
         if kept_run.failure is not None:
             return f"A run ended early: {escape_markdown(kept_run.failure)}"
-    [found] = [effect for effect in EFFECTS if effect.name == name]
+    [shown] = [effect for effect in EFFECTS if effect.name == name]
     with styled():
-        text, figure = found.show(*kept_runs)
+        text, figure = shown.show(*kept_runs)
         save(figure, folder / f"{name}.png")
-    return f"{text}\n\n{picture(found.title, f'{folder.name}/{name}.png')}"
+    return f"{text}\n\n{picture(shown.title, f'{folder.name}/{name}.png')}"
 
 
 def _draw_lines(
     axes: Axes, x: ArrayLike, rows: ArrayLike, names: Sequence[str] = _SIGNALS, marker: str = "o"
 ) -> None:
-    """Draw a line for each of three numbers, of which a row has one value each."""
+    """Draw a line for each column of rows of three numbers."""
     columns = zip(names, np.transpose(rows), COLOURS, STYLES, strict=False)
     for name, column, colour, style in columns:
         axes.plot(x, column, label=name, color=colour, linestyle=style, marker=marker)
@@ -135,7 +135,7 @@ def disturbance(*sevens: KeptRun) -> Shown:
     return (
         "Errors and commands of (a), (b) and (c) in the same scale. The largest e_f grows as "
         f"{numbers(errors)} m; the largest command is {numbers(peaks)} N, soon after the start.",
-        overlay("", runs),
+        one_figure("overlay", "", runs),
     )
 
 
@@ -148,7 +148,11 @@ def jacobian(full: KeptRun, printed: KeptRun) -> Shown:
         f"{numbers(full.metrics['final_error'])} m (reading 3). The vehicle tumbles on its way "
         "with (11) as printed; the large errors on the way drive theta_hat up, and with it the "
         "accuracy at the end, as a smaller eps_t would.",
-        overlay("", [Drawn("full attitude", full.table), Drawn("(11) as printed", printed.table)]),
+        one_figure(
+            "overlay",
+            "",
+            [Drawn("full attitude", full.table), Drawn("(11) as printed", printed.table)],
+        ),
     )
 
 
@@ -219,7 +223,7 @@ def noise(*runs: KeptRun) -> Shown:
     one_mm, one_cm = (runs[NOISE_LEVELS.index(level)].metrics for level in (1e-3, 1e-2))
     figure = Figure(figsize=(FIGURE_WIDTH, 3.2))
     effort, peak = figure.subplots(1, 2)
-    # A logarithmic axis that begins at zero: the first level is none at all.
+    # A logarithmic axis that begins at zero, the first level.
     levels = np.array(NOISE_LEVELS) * 1e3
     for axes, key, title, unit in (
         (effort, "l2_effort", "L2 norm of the applied signals", "N·√s, N·m·√s"),
@@ -279,7 +283,7 @@ def saturation(tanh: KeptRun, algebraic: KeptRun) -> Shown:
     return (
         f"Fig. 4 without noise. L2 effort {' against '.join(efforts)}; "
         f"e_f {errors[0]} m against {errors[1]} m.",
-        overlay("", [Drawn("tanh", tanh.table), Drawn("algebraic", algebraic.table)]),
+        one_figure("overlay", "", [Drawn("tanh", tanh.table), Drawn("algebraic", algebraic.table)]),
     )
 
 

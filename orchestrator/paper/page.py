@@ -1,4 +1,4 @@
-"""Pages of the report: numbers as text, tables, pages of docs/ that it holds, Markdown to HTML."""
+"""Markdown of the report: numbers, tables, pages of docs/ in it, and the HTML page."""
 
 from __future__ import annotations
 
@@ -24,58 +24,52 @@ _TEMPLATE = Path(__file__).with_name("report.html")
 
 _MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
 
-#: Where the pages are: with the package that was built, or in the repository.
+#: Folders of the pages: of an installed package, or of the repository.
 _FOLDERS = Path(__file__).with_name("pages"), Path(__file__).parents[2] / "docs" / "explanation"
 
-#: Where links between pages lead in the report, which has no others.
+#: Anchors in the report for links to its pages; other links become text.
 _ANCHORS = {"paper.md": "#what-is-wrong-in-the-paper", "readings.md": "#readings"}
 
 _LINK = re.compile(r"\[([^\]]+)\]\(([\w./-]+\.md)(?:#[\w-]+)?\)")
 _FILLED = re.compile(r"<!-- (?:filled: \w+|/) -->")
 _READING = re.compile(r"^#+ Reading (\d+)$", re.MULTILINE)
 
-#: Mentions outside headings.
+#: Mentions of readings outside headings.
 _MENTION = re.compile(r"(?<!# )\b[Rr]eadings? \d+(?:(?:, | to | and )\d+)*")
 
 
 def numbers(values: Sequence[float]) -> str:
-    """A few values with three digits."""
+    """Return values as text with three digits."""
     return ", ".join(f"{value:.3g}" for value in values)
 
 
 def actuator_values(values: Sequence[float], times: str = "") -> str:
-    """Values of u, q and r with their units.
-
-    Args:
-        values: of the surge force and of the moments of pitch and yaw.
-        times: what newtons and newton metres are multiplied by.
-
-    """
+    """Return values of u, q and r with their units, N or N·m, followed by a factor `times`."""
     return values_with_units(values, [f"{printed_unit(unit)}{times}" for unit in TAU.values()])
 
 
 def values_with_units(values: Sequence[float], units: Iterable[str]) -> str:
-    """A few values, of which neighbours share their unit."""
+    """Return values with units; equal units of neighbours are written once."""
     shared = groupby(zip(values, units, strict=True), key=itemgetter(1))
     parts = ((numbers([value for value, _ in pairs]), unit) for unit, pairs in shared)
     return "; ".join(" ".join(filter(None, part)) for part in parts)
 
 
 def escape_markdown(text: str) -> str:
-    """Escape the marks of Markdown in a text, and make one line of it."""
-    # An underscore within a name is not emphasis.
+    """Escape the marks of Markdown in a text, and join its lines."""
+    # An underscore in a name is not emphasis.
     marks = r"[\\`*{}\[\]<>#|&]|(?<![^\W_])_|_(?![^\W_])"
     return re.sub(marks, r"\\\g<0>", " ".join(text.split()))
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown, whose cells are Markdown."""
+    """Return a table in Markdown with cells in Markdown."""
     lines = [header, ["---"] * len(header), *rows]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def picture(title: str, file: str) -> str:
-    """A picture in Markdown that leads to its file in full size."""
+    """Return a picture in Markdown that is a link to its file."""
     return f"[![{title}]({file})]({file})"
 
 
@@ -85,7 +79,7 @@ class Heading(NamedTuple):
     Attributes:
         level: 1 for the title.
         title: in Markdown.
-        anchor: what a link leads to, as GitHub names it too.
+        anchor: target of links, as GitHub names it.
 
     """
 
@@ -94,13 +88,8 @@ class Heading(NamedTuple):
     anchor: str
 
 
-def headings(text: str) -> list[Heading]:
-    """The headings of a text in Markdown."""
-    return list(_headings(_MARKDOWN.parse(text)))
-
-
 def _headings(tokens: Sequence[Token]) -> Iterator[Heading]:
-    """The headings among some tokens, which are given their anchors."""
+    """Yield the headings among tokens, and set their anchors."""
     seen: Counter[str] = Counter()
     for token, inline in pairwise(tokens):
         if token.type == "heading_open":
@@ -114,16 +103,16 @@ def _headings(tokens: Sequence[Token]) -> Iterator[Heading]:
 
 
 def contents(text: str) -> str:
-    """Links to the headings of a text below its title, down to the third level."""
+    """Return links to the headings of a text of levels 2 and 3."""
     return "\n".join(
         f"{'  ' * (heading.level - 2)}- [{heading.title}](#{heading.anchor})"
-        for heading in headings(text)
+        for heading in _headings(_MARKDOWN.parse(text))
         if 1 < heading.level <= 3
     )
 
 
 def html(text: str, folder: Path) -> str:
-    """A text in Markdown as a page, with the pictures of a folder within it."""
+    """Return a text in Markdown as an HTML page with the pictures of a folder embedded."""
     tokens = _MARKDOWN.parse(text)
     [title, *_] = _headings(tokens)
     _embed_pictures(tokens, folder)
@@ -132,7 +121,7 @@ def html(text: str, folder: Path) -> str:
 
 
 def _embed_pictures(tokens: Sequence[Token], folder: Path) -> None:
-    """Put the pictures of a folder into the page; of any other, only its title stays."""
+    """Embed the pictures of a folder; any other picture is replaced by its title."""
     for part in chain.from_iterable(token.children or () for token in tokens):
         if part.type == "image":
             file = (folder / unquote(str(part.attrGet("src")))).resolve()
@@ -144,25 +133,25 @@ def _embed_pictures(tokens: Sequence[Token], folder: Path) -> None:
 
 
 def without_pictures(text: str) -> str:
-    """Somebody's Markdown, in which pictures and HTML are text: a viewer would fetch them."""
+    """Return Markdown of a user with pictures and HTML as text, since viewers would fetch them."""
     return text.replace("<", "&lt;").replace("![", "&#33;[")
 
 
 def errata() -> str:
-    """The errors of the paper, in Markdown, with headings of the third and fourth level."""
+    """Return the errors of the paper in Markdown, with headings of levels 3 and 4."""
     _, _, text = _page_of_docs("paper.md").partition("\n")
     points, _, _ = text.partition("\n## The theorem in numbers\n")
     return _deeper(points, 1)
 
 
 def readings() -> str:
-    """The readings in Markdown, with a heading of the fourth level each."""
+    """Return the readings in Markdown, each with a heading of level 4."""
     _, first, text = _page_of_docs("readings.md").partition("\n## ")
     return _deeper(first + text, 2)
 
 
 def linked(text: str) -> str:
-    """Markdown in which every mention of a reading leads to its section."""
+    """Return Markdown with a link to its section for every mention of a reading."""
     known = _READING.findall(_page_of_docs("readings.md"))
 
     def link(number: re.Match[str]) -> str:
@@ -173,7 +162,7 @@ def linked(text: str) -> str:
 
 @cache
 def _page_of_docs(name: str) -> str:
-    """A page, without marks of what is filled in, and without links to pages that are elsewhere."""
+    """Return a page without marks of filled parts, and without links to pages not in the report."""
     folder = next(folder for folder in _FOLDERS if (folder / name).is_file())
     text = _FILLED.sub("", (folder / name).read_text(encoding="utf-8"))
     return _LINK.sub(_local, text)

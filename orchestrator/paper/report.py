@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import platform
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
@@ -17,15 +17,16 @@ from typing import Any
 import numpy as np
 
 from fmus.kinds import AUTO, KindName
-from orchestrator.cosim import PortName
+from orchestrator.cosim import PortName, Table
 from orchestrator.figures.drawing import draw
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.figures.style import Drawn, printed_unit
+from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.identity import digest_of
 from orchestrator.machine.workers import Workers, workers
-from orchestrator.paper.claims import CLAIMS
+from orchestrator.paper.claims import CLAIMS, KeptRun
 from orchestrator.paper.effects import EFFECTS, show_effect
-from orchestrator.paper.kept_runs import Companion, KeptRun, KeptRuns
 from orchestrator.paper.page import (
     contents,
     errata,
@@ -40,21 +41,19 @@ from orchestrator.paper.page import (
 )
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.folder import RECORD, replace_files
-from orchestrator.runs.preparation import prepare_request
+from orchestrator.runs.preparation import Prepared, prepare_request, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.result import RECORDED_PACKAGES, Stopwatch, write_content
 from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.vehicle.indices import metrics, of_vehicles
+from orchestrator.vehicle.indices import Metrics, metrics, of_vehicles
 from orchestrator.vehicle.proof import gain_check
 
-#: The folder of the figures.
+#: Folder of the figures, and files of the report.
 _FIGURES = "figures"
-
-#: The files.
 _NAMES = _PAGE, _MARKDOWN = "report.html", "report.md"
 
-#: So many runs of a claim are not named one by one; the end of the report lists all.
+#: Number of runs from which only the first and last run of a claim are named.
 _MANY = 5
 
 _TITLE = "# Section 4 reproduced"
@@ -80,8 +79,86 @@ No choice of the points that the paper leaves open gives all printed numbers tog
 `python tools/printed_table.py`, in the repository, tries every combination, and the page \
 *The printed table against every reading* of the documentation has what comes of it."""
 
-#: The parameter that decides whether a run has a twin without noise.
+#: A run in which this parameter is not 0 is drawn with a second run without noise.
 _NOISE = "plant.noise.std"
+
+
+# Runs
+
+
+@dataclass(frozen=True)
+class Companion(Request):
+    """The run that a scenario is compared with, as the request of the scenario."""
+
+    @property
+    def label(self) -> str:
+        """Command that makes both runs."""
+        return f"{super().label} (its companion)"
+
+
+def make_runs(
+    requests: Iterable[Request],
+    pool: Workers,
+    stop_time: float | None = None,
+    kind: KindName = AUTO,
+) -> dict[Request, KeptRun]:
+    """Make runs, the longest first; equal runs, whatever their names, are made once.
+
+    Args:
+        requests: of the runs.
+        pool: that makes them.
+        stop_time: of all runs [s]; None: their own.
+        kind: of the bundle's FMUs in all runs.
+
+    Returns:
+        The runs, with the shortest label of the requests that equal runs have.
+
+    Raises:
+        KeyboardInterrupt: there was a signal to stop.
+
+    """
+    keys: dict[Request, str] = {}
+    labels: dict[str, str] = {}
+    runs: dict[str, KeptRun] = {}
+    wanted: dict[str, tuple[int, Request]] = {}
+    for request in dict.fromkeys(requests):
+        asked = replace(request, stop_time=stop_time or request.stop_time, kind=kind)
+        try:
+            prepared = _prepared(asked)
+        except InputError as error:
+            key, label = repr(request), request.label
+            runs[key] = KeptRun({"failure": str(error)}, Table())
+        else:
+            key, label = digest_of(prepared.identity), asked.label
+            wanted.setdefault(key, (prepared.experiment.rows, asked))
+        keys[request] = key
+        labels[key] = min(label, labels.get(key, label), key=len)
+    longest_first = sorted(wanted.items(), key=lambda item: -item[1][0])
+    tasks = {key: partial(_make, asked) for key, (_, asked) in longest_first}
+    runs |= pool.results(tasks, "run")
+    named = {key: replace(runs[key], label=label) for key, label in labels.items()}
+    return {request: named[key] for request, key in keys.items()}
+
+
+def _prepared(request: Request) -> Prepared:
+    own = prepare_request(request)
+    return with_companion(own, request)[1] if isinstance(request, Companion) else own
+
+
+def _make(request: Request) -> KeptRun:
+    """Make a run; a task for a worker."""
+    try:
+        prepared = _prepared(request)
+        metrics = Metrics(prepared.loops)
+        seen = VisibleRows({name for loop in prepared.loops for name in loop.drawn()})
+        prepared.run([metrics, seen])
+    except InputError as error:
+        return KeptRun({"failure": str(error)}, Table())
+    values = metrics.content(prepared.scenario.name, prepared.system)
+    return KeptRun(values, Table.of(seen.header, seen.rows, seen.ending), prepared.loops)
+
+
+# Sections
 
 
 @dataclass(frozen=True)
@@ -89,9 +166,9 @@ class Section:
     """A scenario in the report.
 
     Attributes:
-        name: of its figures' folder.
-        scenario: what its file says.
-        runs: what is drawn, by the labels that tell them apart; its own comes first.
+        name: of the folder of its figures.
+        scenario: content of its file.
+        runs: to draw, by label; the scenario's own run first.
 
     """
 
@@ -106,30 +183,29 @@ class Section:
 
 
 def sections(references: Sequence[str], kind: KindName = AUTO) -> list[Section]:
-    """The sections of some scenarios, by their names or the paths of their files.
+    """Return the sections of scenarios, given by their names or the paths of their files.
 
     Raises:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
-    found: list[Section] = []
+    sections: dict[str, Section] = {}
     for reference in references:
         scenario = read_scenario(reference)
-        taken = {section.name for section in found}
         stem = scenario.stem
         names = chain([stem], (f"{stem}-{n}" for n in count(2)))
-        name = next(name for name in names if name not in taken)
-        found.append(Section(name, scenario, _runs(reference, scenario, kind)))
-    return found
+        name = next(name for name in names if name not in sections)
+        sections[name] = Section(name, scenario, _runs(reference, scenario, kind))
+    return list(sections.values())
 
 
 def _runs(reference: str, scenario: Scenario, kind: KindName) -> dict[str, Request]:
-    """The run of a scenario and what it is drawn with: its companion, or its twin without noise."""
+    """Return the run of a scenario, and its companion or the same run without noise."""
     request = Request(reference, kind=kind)
     try:
         prepared = prepare_request(request)
     except InputError:
-        # The report says why it cannot be made.
+        # The report gives the reason.
         return {scenario.legend: request}
     if scenario.compare:
         label = scenario.compare.label or scenario.compare.name
@@ -142,63 +218,63 @@ def _runs(reference: str, scenario: Scenario, kind: KindName) -> dict[str, Reque
     return {scenario.legend: request}
 
 
-def draw_section(section: Section, kept_runs: Sequence[KeptRun], folder: Path) -> list[str]:
-    """Draw the figures of a section and give notes on what is left out; a task for a worker."""
+def draw_section(section: Section, runs: Sequence[KeptRun], folder: Path) -> list[str]:
+    """Draw the figures of a section, return notes on what is left out; a task for a worker."""
     key = section.scenario.figure
     if key not in FIGURES:
         return [f"no figure: there is none of the name {key!r}{did_you_mean(key, FIGURES)}"]
-    runs = [
-        Drawn(label, kept_run.table, section.scenario.z_up, kept_run.loops)
-        for label, kept_run in zip(section.runs, kept_runs, strict=True)
-        if len(kept_run.table)
+    drawn = [
+        Drawn(label, run.table, section.scenario.z_up, run.loops)
+        for label, run in zip(section.runs, runs, strict=True)
+        if len(run.table)
     ]
-    if not runs:
+    if not drawn:
         return []
     folder.mkdir(parents=True)
-    # The heading of the section stands above the figure already.
-    return draw(key, "", runs, folder, section.name)
+    # The section has the heading.
+    return draw(key, "", drawn, folder, section.name)
 
 
 def section_text(
-    section: Section, kept_runs: KeptRuns, notes: Sequence[str], folder: Path
+    section: Section, runs: Mapping[Request, KeptRun], notes: Sequence[str], folder: Path
 ) -> Iterator[str]:
-    """A section in Markdown, with notes on what its figures in the folder leave out."""
-    scenario, own = section.scenario, kept_runs[next(iter(section.runs.values()))]
+    """Yield the parts of a section in Markdown, with notes and the figures in a folder."""
+    scenario = section.scenario
+    made = {label: runs[request] for label, request in section.runs.items()}
     yield f"### {section.title}"
-    # By their stems: `fig4` comes before `fig4-velocity`.
-    files = Path(folder, "figures", section.name).glob("*.png")
+    # Sorted by stem: `fig4` comes before `fig4-velocity`.
+    files = Path(folder, _FIGURES, section.name).glob("*.png")
     for file in sorted(files, key=attrgetter("stem")):
         yield picture(section.title, file.relative_to(folder).as_posix())
     yield from (f"Note: {escape_markdown(note)}." for note in notes)
     if scenario.remark:
         yield without_pictures(scenario.remark)
-    made = {label: kept_runs[request] for label, request in section.runs.items()}
-    for label, kept_run in made.items():
-        if kept_run.failure is not None:
-            why = escape_markdown(kept_run.failure)
+    for label, run in made.items():
+        if run.failure is not None:
+            why = escape_markdown(run.failure)
             yield f"**The run {escape_markdown(label)} ended early:** {why}"
     by_vehicle = {
-        ", ".join(filter(None, (label, vehicle))): found
-        for label, kept_run in made.items()
-        for vehicle, found in of_vehicles(kept_run.metrics).items()
+        ", ".join(filter(None, (label, vehicle))): indices
+        for label, run in made.items()
+        for vehicle, indices in of_vehicles(run.metrics).items()
     }
-    if rows := list(_indices(list(by_vehicle.values()))):
+    if rows := list(_index_rows(list(by_vehicle.values()))):
         yield table(["index", *map(escape_markdown, by_vehicle)], rows)
-    reaching = own.metrics.get("velocities_reaching_controller")
+    reaching = next(iter(made.values())).metrics.get("velocities_reaching_controller")
     if reaching is not None:
         names = ", ".join(f"`{name}`" for name in reaching) or "none"
         yield f"Velocities of the vehicle that reach the controller: {names}."
     yield "\n".join(
-        f"- {escape_markdown(label)}: `auv-fmu run {kept_runs.label(request)}`"
-        + (f", until {time:g} s" if (time := kept_runs[request].metrics.get("stop_time")) else "")
-        for label, request in section.runs.items()
+        f"- {escape_markdown(label)}: `auv-fmu run {run.label}`"
+        + (f", until {time:g} s" if (time := run.metrics.get("stop_time")) else "")
+        for label, run in made.items()
     )
     if scenario.ours:
         yield "Ours, not the paper's:"
         yield "\n".join(_ours(scenario))
 
 
-def _indices(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
+def _index_rows(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
     for index in metrics():
         if any(index.name in values for values in runs):
             units = [printed_unit(unit) for unit in index.units.values()]
@@ -213,13 +289,16 @@ def _indices(runs: Sequence[Mapping[str, Any]]) -> Iterator[list[str]]:
 
 
 def _ours(scenario: Scenario) -> Iterator[str]:
-    """The values that are not the paper's, and why."""
+    """Yield the values that are ours, not the paper's, with reasons."""
     values = {str(name): value for name, value in scenario.parameters.items()}
     for name, why in scenario.ours.items():
         value = values.get(name, vars(scenario).get(name))
         is_short = value is not None and not isinstance(value, Mapping)
         stated = f"{name} = {json.dumps(value, default=str)}" if is_short else name
         yield f"- `{stated}`: {escape_markdown(why)}"
+
+
+# The report
 
 
 def write_report(
@@ -234,32 +313,60 @@ def write_report(
 
     Args:
         folder: to write into.
-        scenarios: that have a section: names, or paths of files.
+        scenarios: of the sections: names, or paths of files.
         command: for the record.
-        stop_time: of all runs [s]; None: their own. For a look at the report, not at the paper.
+        stop_time: of all runs [s], for a quick look; None: their own.
         kind: of the bundle's FMUs in all runs.
-        force: move aside files of the user's that have names of these.
+        force: move aside files of the user's with the same names.
 
     Returns:
         The two files.
 
     Raises:
         InputError: a scenario file has a mistake, or the folder cannot be written.
-        KeyboardInterrupt: the user does not want to wait.
+        KeyboardInterrupt: there was a signal to stop.
 
     """
     clock = Stopwatch()
-    # Built before there are processes that would each build them.
+    # Built here, so that not every worker builds them.
     fmus = current_fmus(kind)
     chapters = sections(scenarios, kind)
     requests = [request for section in chapters for request in section.runs.values()]
     requests += [request for claim in CLAIMS for request in claim.runs]
     requests += [request for effect in EFFECTS for request in effect.runs]
     with replace_files(folder, (*_NAMES, RECORD), force=force) as unfinished:
-        with workers() as crew:
-            kept_runs = KeptRuns(requests, crew, stop_time, kind)
-            notes, effects = _draw(chapters, kept_runs, unfinished, crew)
-        parts = _text(chapters, kept_runs, notes, effects, command, unfinished, fmus)
+        with workers() as pool:
+            runs = make_runs(requests, pool, stop_time, kind)
+            notes, effects = _draw(chapters, runs, unfinished, pool)
+        labels = list(dict.fromkeys(f"auv-fmu run {run.label}" for run in runs.values()))
+        parts = [
+            "## Every printed number and claim",
+            _claims(runs),
+            _WHY_NUMBERS_DIFFER,
+            "## The printed table against every reading",
+            _NO_VARIANTS,
+            "## Figures",
+        ]
+        for section in chapters:
+            parts += section_text(section, runs, notes[section.name], unfinished)
+        parts.append("## Effects that the paper does not show")
+        for effect in EFFECTS:
+            commands = (f"- `auv-fmu run {runs[request].label}`" for request in effect.runs)
+            parts += [f"### {effect.title}", effects[effect.name], "\n".join(commands)]
+        versions = ", ".join(f"{package} {version(package)}" for package in RECORDED_PACKAGES)
+        parts += [
+            "## Gain conditions",
+            f"`auv-fmu gains`:\n\n```\n{gain_check(closed_loop(fmus))}\n```",
+            "## What is wrong in the paper",
+            errata(),
+            "## Readings",
+            readings(),
+            "## Versions and commands",
+            f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`.",
+            "Each of these commands makes a run of this report; settings without an option are in "
+            "parentheses:",
+            "```\n" + "\n".join(labels) + "\n```",
+        ]
         body = linked("\n\n".join(parts))
         text = f"{_TITLE}\n\n{linked(_INTRODUCTION)}\n\n{contents(body)}\n\n{body}\n"
         (unfinished / _MARKDOWN).write_text(text, encoding="utf-8")
@@ -268,84 +375,48 @@ def write_report(
             "title": _TITLE.removeprefix("# "),
             "command": list(command),
             **clock.times(),
-            "runs": [f"auv-fmu run {label}" for label in kept_runs.labels],
+            "runs": labels,
         }
         write_content(unfinished, record)
     return folder / _PAGE, folder / _MARKDOWN
 
 
 def _draw(
-    chapters: Sequence[Section], kept_runs: KeptRuns, folder: Path, crew: Workers
+    chapters: Sequence[Section], runs: Mapping[Request, KeptRun], folder: Path, pool: Workers
 ) -> tuple[dict[str, list[str]], dict[str, str]]:
-    """Draw all figures; give the notes on the sections' figures, and the texts of the effects."""
+    """Draw all figures; return the notes of the sections, and the texts of the effects."""
     figures = folder / _FIGURES
     figures.mkdir()
     tasks: dict[tuple[str, str], Callable[[], Any]] = {}
     for section in chapters:
-        made = [kept_runs[request] for request in section.runs.values()]
+        made = [runs[request] for request in section.runs.values()]
         tasks["section", section.name] = partial(
             draw_section, section, made, figures / section.name
         )
     for effect in EFFECTS:
-        made = [kept_runs[request] for request in effect.runs]
+        made = [runs[request] for request in effect.runs]
         tasks["effect", effect.name] = partial(show_effect, effect.name, made, figures)
-    results = dict(crew.results(tasks, "figure"))
+    results = dict(pool.results(tasks, "figure"))
     notes = {section.name: results["section", section.name] for section in chapters}
     return notes, {effect.name: results["effect", effect.name] for effect in EFFECTS}
 
 
-def _text(
-    chapters: Sequence[Section],
-    kept_runs: KeptRuns,
-    notes: dict[str, list[str]],
-    effects: dict[str, str],
-    command: Sequence[str],
-    folder: Path,
-    fmus: Path,
-) -> Iterator[str]:
-    yield "## Every printed number and claim"
-    yield _claims(kept_runs)
-    yield _WHY_NUMBERS_DIFFER
-    yield "## The printed table against every reading"
-    yield _NO_VARIANTS
-    yield "## Figures"
-    for section in chapters:
-        yield from section_text(section, kept_runs, notes[section.name], folder)
-    yield "## Effects that the paper does not show"
-    for effect in EFFECTS:
-        yield f"### {effect.title}"
-        yield effects[effect.name]
-        yield "\n".join(f"- `auv-fmu run {kept_runs.label(request)}`" for request in effect.runs)
-    yield "## Gain conditions"
-    yield f"`auv-fmu gains`:\n\n```\n{gain_check(closed_loop(fmus))}\n```"
-    yield "## What is wrong in the paper"
-    yield errata()
-    yield "## Readings"
-    yield readings()
-    yield "## Versions and commands"
-    versions = ", ".join(f"{package} {version(package)}" for package in RECORDED_PACKAGES)
-    yield f"Python {platform.python_version()}, {versions}. Written by `{shlex.join(command)}`."
-    yield (
-        "Each of these commands makes a run of this report; settings without an option are in "
-        "parentheses:"
-    )
-    yield "```\n" + "\n".join(f"auv-fmu run {label}" for label in kept_runs.labels) + "\n```"
-
-
-def _claims(kept_runs: KeptRuns) -> str:
+def _claims(kept: Mapping[Request, KeptRun]) -> str:
+    """Return the table of all claims, below the count of the verdicts."""
     rows, verdicts = [], []
     for claim in CLAIMS:
-        finding = claim.finding([kept_runs[request] for request in claim.runs])
+        runs = [kept[request] for request in claim.runs]
+        finding = claim.finding(runs)
         verdicts.append(finding.verdict)
-        cells = [claim.title, claim.published, finding.ours, finding.verdict]
-        labels = [f"`{kept_runs.label(request)}`" for request in claim.runs]
-        runs = ", ".join(labels if len(labels) < _MANY else [labels[0], "...", labels[-1]])
-        rows.append([cell.replace("|", "\\|") for cell in (*cells, runs)])
+        labels = [f"`{run.label}`" for run in runs]
+        listed = ", ".join(labels if len(labels) < _MANY else [labels[0], "...", labels[-1]])
+        cells = [claim.title, claim.published, finding.ours, finding.verdict, listed]
+        rows.append([cell.replace("|", "\\|") for cell in cells])
     return f"{counted(verdicts)}\n\n" + table(["claim", "paper", "ours", "verdict", "run"], rows)
 
 
 def counted(verdicts: Sequence[str]) -> str:
-    """Count the verdicts of each kind, in a sentence."""
+    """Return a sentence with the number of verdicts of each kind."""
     agree, differ = (sum(v.startswith(kind) for v in verdicts) for kind in ("agrees", "**"))
     text = f"Of {len(verdicts)} printed numbers and claims, {agree} agree and {differ} do not"
     rest = len(verdicts) - agree - differ

@@ -212,7 +212,7 @@ class Result(Table):
             ValueError: a pattern matches no column.
 
         """
-        from orchestrator.figures.plot import plot, told_apart  # noqa: PLC0415
+        from orchestrator.figures.drawing import plot, told_apart  # noqa: PLC0415
 
         results = [self, *(each for each in what if isinstance(each, Result))]
         patterns = [each for each in what if not isinstance(each, Result)]
@@ -232,8 +232,7 @@ class Result(Table):
                 others is not a result.
 
         """
-        from orchestrator.figures.drawing import one_figure  # noqa: PLC0415
-        from orchestrator.figures.plot import told_apart  # noqa: PLC0415
+        from orchestrator.figures.drawing import one_figure, told_apart  # noqa: PLC0415
 
         for other in others:
             if not isinstance(other, Result):

@@ -1,4 +1,4 @@
-"""Many runs: what varies, the engines that make them, and what is kept of them.
+"""Many runs: what varies, the engines that make the runs, and their files.
 
 Begin with `study`, then `sweep`.
 """

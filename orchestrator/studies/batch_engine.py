@@ -1,4 +1,4 @@
-"""Runs by compiled programs: the numbers of the FMUs, far sooner."""
+"""The engine that makes runs by compiled programs, with the numbers of the FMUs."""
 
 from __future__ import annotations
 
@@ -42,24 +42,24 @@ from orchestrator.vehicle.cautions import (
 from orchestrator.vehicle.indices import INDICES, SMALLEST_DISTANCE, prefixed, smallest_of
 from orchestrator.vehicle.signals import loops_of
 
-#: What makes every system.
-_OTHER = "use --engine fmu"
+#: Advice for systems that this engine cannot run.
+_ADVICE = "use --engine fmu"
 
-#: Said of a run that the program has refused: FMUs make it again, and say why.
+#: Failure of a run that the program has refused; it is repeated with FMUs, which give a reason.
 REFUSED = "refused"
 
-#: What tells apart the programs that a system has: the order, and the steps of components.
+#: Key of the programs of a system: the order, and the decimations of the components.
 _Key = tuple[Order | None, tuple[int, ...]]
 
 
 @dataclass(frozen=True)
-class _Ready:
-    """The program of a system, as it travels, and what its numbers are.
+class _Compiled:
+    """The program of a system, and the places of indices in its results.
 
     Attributes:
         source: of the program.
-        groups: for each index, its columns and their places among the numbers.
-        watched: for each loop, the places of what cautions follow from.
+        groups: for each index, the places of its columns.
+        watched: for each loop, the places of the values that cautions depend on.
 
     """
 
@@ -77,31 +77,31 @@ class _Ready:
         return {column: place for group in self.groups for column, place in group.items()}
 
     def indices(self, numbers: Sequence[float]) -> dict[str, float]:
-        """The indices among the numbers of a run, without those that are not there."""
-        found = {column: numbers[place] for column, place in self._places.items()}
-        if any(map(isnan, found.values())):
+        """Return the indices in the results of a run, without groups of nan."""
+        indices = {column: numbers[place] for column, place in self._places.items()}
+        if any(map(isnan, indices.values())):
             for group in self.groups:
                 if all(isnan(numbers[place]) for place in group.values()):
                     for column in group:
-                        del found[column]
-        return found
+                        del indices[column]
+        return indices
 
     def __getstate__(self) -> Mapping[str, Any]:
-        """Without the library, which each process loads."""
-        kept = {name: one for name, one in self.__dict__.items() if name != "program"}
-        return {**kept, "source": self.program.source.with_library()}
+        """Return the state without the loaded library; each process loads it."""
+        state = {name: value for name, value in self.__dict__.items() if name != "program"}
+        return {**state, "source": self.program.source.with_library()}
 
 
 class _Parameter(NamedTuple):
-    """A parameter of a program: its place, and the port that says what it can be."""
+    """A parameter of a program: its place, its port, and the numbers of items of Enumerations."""
 
     place: int
     port: Port
     items: Mapping[str, int]
 
 
-class _Known:
-    """A system that a program is made of.
+class _Programs:
+    """The programs of a system.
 
     Attributes:
         system: with its own values.
@@ -112,8 +112,8 @@ class _Known:
     def __init__(self, system: System, own: Sequence[OwnIndex]) -> None:
         self.system, self.loops = system, loops_of(system)
         self._own = own
-        self._ready: dict[_Key, _Ready] = {}
-        self._found: dict[tuple[Order | None, float], _Ready] = {}
+        self._by_key: dict[_Key, _Compiled] = {}
+        self._by_step: dict[tuple[Order | None, float], _Compiled] = {}
         self._definitions: Mapping[str, Definition] | None = definitions_of(system)
         self._parameters: tuple[Mapping[str, _Parameter], np.ndarray] | None = None
         self._names = frozenset(
@@ -122,25 +122,25 @@ class _Known:
             for port in component.variables
         )
 
-    def ready(self, order: Order | None, step: float) -> _Ready:
-        """The program for an order and a step.
+    def compiled(self, order: Order | None, step: float) -> _Compiled:
+        """Return the program for an order and a step.
 
         Raises:
             InputError: there is none.
 
         """
-        if (order, step) not in self._found:
+        if (order, step) not in self._by_step:
             key = order, tuple(self.system.decimations(step).values())
-            if key not in self._ready:
-                self._ready[key] = self._written(order, step)
-            self._found[order, step] = self._ready[key]
-        return self._found[order, step]
+            if key not in self._by_key:
+                self._by_key[key] = self._make(order, step)
+            self._by_step[order, step] = self._by_key[key]
+        return self._by_step[order, step]
 
-    def _written(self, order: Order | None, step: float) -> _Ready:
+    def _make(self, order: Order | None, step: float) -> _Compiled:
         system = self.system
         if self._definitions is None:
             self._definitions = definitions_of(system)
-        indices = [*INDICES, *chain.from_iterable(one.indices for one in self._own)]
+        indices = [*INDICES, *chain.from_iterable(file.indices for file in self._own)]
         reducers = [*dict.fromkeys(index.reducer for index in indices), *WATCHED]
         plan = make_plan(system, Experiment(step * 2.0**20, step, order))
         looking = [[*looking_at(system, loop, reducers)] for loop in self.loops]
@@ -152,48 +152,49 @@ class _Known:
                 for name, ports in look.reducer.results.items():
                     places[name] = first
                     first += len(ports)
-            found = (index for index in indices if index.name in places)
             groups += [
-                {f"{prefix}{one}": places[index.name] + i for i, one in enumerate(index.columns)}
-                for index in found
+                {f"{prefix}{name}": places[index.name] + i for i, name in enumerate(index.columns)}
+                for index in indices
+                if index.name in places
             ]
-            names = (name for one in WATCHED for name in one.results)
+            names = (name for reducer in WATCHED for name in reducer.results)
             watched.append({name: places[name] for name in names if name in places})
-        return _Ready(Source.of(text), groups, watched)
+        return _Compiled(Source.of(text), groups, watched)
 
     def plain(self, point: Point) -> Point:
-        """A run without names that mean several parameters: stars, and groups of them."""
+        """Return a run whose parameters are single ones: without wildcards and groups."""
         if self._names.issuperset(point.parameters):
             return point
         expanded = self.system.expanded(point.parameters)
         parameters = {str(self.system.named(name)): value for name, value in expanded.items()}
         return point._replace(parameters=parameters)
 
-    def values(self, ready: _Ready, changed: Mapping[str, Value]) -> np.ndarray:
-        """The values of all parameters of a run.
+    def values(self, compiled: _Compiled, changed: Mapping[str, Value]) -> np.ndarray:
+        """Return the values of all parameters of a run.
 
         Raises:
             Refusal: a component would refuse one.
 
         """
         if self._parameters is None:
-            # At once: other threads make runs.
-            self._parameters = self._taken(ready)
-        parameters, own = self._parameters
-        values = own.copy()
+            # In one assignment, since other threads make runs.
+            self._parameters = self._defaults(compiled)
+        parameters, defaults = self._parameters
+        values = defaults.copy()
         for name, value in changed.items():
-            one = parameters[name]
-            values[one.place] = _number(one, value)
+            parameter = parameters[name]
+            values[parameter.place] = _number(parameter, value)
         return values
 
-    def _taken(self, ready: _Ready) -> tuple[Mapping[str, _Parameter], np.ndarray]:
-        """All parameters of a program by their names, and the values that the system has."""
-        names = ready.source.parameters
+    def _defaults(self, compiled: _Compiled) -> tuple[Mapping[str, _Parameter], np.ndarray]:
+        """Return all parameters of a program by name, and their values in the system."""
+        names = compiled.source.parameters
         parameters = {name: self._parameter(place, name) for place, name in enumerate(names)}
-        own = [
-            _number(one, self.system.value(PortName.read(name))) for name, one in parameters.items()
+        values = [
+            _number(parameter, self.system.value(PortName.read(name)))
+            for name, parameter in parameters.items()
         ]
-        return parameters, np.array(own, dtype=float)
+        return parameters, np.array(values, dtype=float)
 
     def _parameter(self, place: int, text: str) -> _Parameter:
         name = self.system.named(PortName.read(text))
@@ -203,7 +204,7 @@ class _Known:
 
     @cached_property
     def _ports(self) -> Mapping[PortName, Port]:
-        """The ports of all components, whose choices are numbers: modules do not travel."""
+        """The ports of all components, with numbers as choices, which can be pickled."""
         assert self._definitions is not None
         return {
             PortName(name, port.name): replace(
@@ -213,145 +214,142 @@ class _Known:
             for port in definition.ports
         }
 
-    def positions(self, ready: _Ready, rows: np.ndarray) -> np.ndarray:
-        """The positions of all vehicles in some rows."""
-        places = {name: i for i, name in enumerate(ready.source.columns, 1)}
+    def positions(self, compiled: _Compiled, rows: np.ndarray) -> np.ndarray:
+        """Return the positions of all vehicles in rows."""
+        places = {name: i for i, name in enumerate(compiled.source.columns, 1)}
         return np.stack(
             [rows[:, [places[name] for name in loop.position]] for loop in self.loops], axis=1
         )
 
-    def cautions(self, ready: _Ready, point: Point, numbers: Sequence[float]) -> str | None:
-        """What to be wary of in a run."""
+    def cautions(self, compiled: _Compiled, point: Point, numbers: Sequence[float]) -> str | None:
+        """Return the kinds of cautions of a run."""
 
         def value(name: str) -> Value | None:
             return self.value(point, name)
 
-        found = cautions(value, point.step, self.loops)
-        for loop, places in zip(self.loops, ready.watched, strict=True):
+        every = cautions(value, point.step, self.loops)
+        for loop, places in zip(self.loops, compiled.watched, strict=True):
             seen = {name: numbers[i] for name, i in places.items() if not isnan(numbers[i])}
-            found += cautions_seen(seen, loop, value, point.step)
-        return kinds_of(found)
+            every += cautions_seen(seen, loop, value, point.step)
+        return kinds_of(every)
 
     def value(self, point: Point, name: str) -> Value | None:
-        """The value of a parameter in a run; None: there is no such parameter."""
-        found: Value | None
-        found = point.parameters[name] if name in point.parameters else self._values(name)
-        return found
+        """Return the value of a parameter in a run; None if there is no such parameter."""
+        value: Value | None
+        value = point.parameters[name] if name in point.parameters else self._values(name)
+        return value
 
     @cached_property
     def _values(self) -> Any:
         return cache(values_of(self.system))
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without modules, which other machines need not have, but with what is compiled."""
+        """Return the state with programs, and without modules, which other machines may lack."""
         if self._definitions is not None:
             self._ports  # noqa: B018
-        kept = {name: one for name, one in self.__dict__.items() if name != "_values"}
-        return {**kept, "_definitions": None, "_parameters": None}
+        state = {name: value for name, value in self.__dict__.items() if name != "_values"}
+        return {**state, "_definitions": None, "_parameters": None}
 
 
-def _number(one: _Parameter, value: Any) -> float:
-    """The number of a parameter's value.
+def _number(parameter: _Parameter, value: Any) -> float:
+    """Return the value of a parameter as a number.
 
     Raises:
         Refusal: the component would refuse it.
 
     """
-    given: Any = one.items.get(value, value) if isinstance(value, str) else value
-    return float(one.port.checked(given))
+    given: Any = parameter.items.get(value, value) if isinstance(value, str) else value
+    return float(parameter.port.checked(given))
 
 
 class BatchEngine:
-    """Makes runs by the compiled programs of their systems, one after the other in each thread."""
+    """Makes runs by compiled programs."""
 
     def __init__(self, systems: Mapping[str, System], own: Sequence[OwnIndex] = ()) -> None:
-        """Take systems.
+        """Make an engine.
 
         Args:
-            systems: by the names that runs have for their scenarios.
-            own: indices of the user's own.
+            systems: by the names of scenarios in runs.
+            own: the user's own indices.
 
         Raises:
-            InputError: one of them cannot be a program.
+            InputError: a system cannot become a program.
 
         """
-        self._known = dict[str, _Known]()
+        self._programs = dict[str, _Programs]()
         for name, system in systems.items():
             system.check()
             try:
-                self._known[name] = _Known(system, own)
+                self._programs[name] = _Programs(system, own)
             except InputError as error:
-                raise InputError(f"{name}: {error}; {_OTHER}") from None
+                raise InputError(f"{name}: {error}; {_ADVICE}") from None
 
     @property
     def digest(self) -> str:
-        """Of the code that makes programs, and of what makes indices of them."""
+        """Hash of the code that makes programs and indices."""
         return code_of("auv_fmu", "fmus", "orchestrator.program", "orchestrator.vehicle")
 
     def prepare(self, point: Point) -> None:
         """Compile the program of a run.
 
         Raises:
-            InputError: it cannot be one; the text says why.
+            InputError: its system cannot become a program; the message has the reason.
 
         """
         try:
-            self._ready(point).program  # noqa: B018
+            self._programs[point.scenario].compiled(point.order, point.step).program  # noqa: B018
         except InputError as error:
-            raise InputError(f"{point.scenario}: {error}; {_OTHER}") from None
+            raise InputError(f"{point.scenario}: {error}; {_ADVICE}") from None
 
     def outcomes(self, points: Iterable[Point]) -> Iterator[Outcome]:
-        """Make some runs, in their order."""
+        """Make runs, in their order."""
         for point in points:
             yield self._outcome(point)
 
     def value(self, point: Point, name: str) -> Value | None:
-        """The value of a parameter in a run; None: there is no such parameter."""
-        known = self._known[point.scenario]
-        return known.value(known.plain(point), name)
-
-    def _ready(self, point: Point) -> _Ready:
-        return self._known[point.scenario].ready(point.order, point.step)
+        """Return the value of a parameter in a run; None if there is no such parameter."""
+        programs = self._programs[point.scenario]
+        return programs.value(programs.plain(point), name)
 
     def _outcome(self, point: Point) -> Outcome:
-        known, ready = self._known[point.scenario], self._ready(point)
-        point, program = known.plain(point), ready.program
-        experiment = _experiment(point)
-        is_fleet = len(known.loops) > 1
+        programs = self._programs[point.scenario]
+        compiled = programs.compiled(point.order, point.step)
+        point, experiment = programs.plain(point), _experiment(point)
         try:
-            values = known.values(ready, point.parameters)
+            values = programs.values(compiled, point.parameters)
         except Refusal:
             return Outcome(point.number, {}, REFUSED)
-        rows = None
-        if is_fleet:
-            rows = np.empty((experiment.rows, 1 + len(ready.source.columns)))
-        found = program.run(values, experiment, rows)
-        if found is None:
+        is_fleet = len(programs.loops) > 1
+        rows = np.empty((experiment.rows, 1 + len(compiled.source.columns))) if is_fleet else None
+        results = compiled.program.run(values, experiment, rows)
+        if results is None:
             return Outcome(point.number, {}, REFUSED)
-        numbers = found.tolist()
+        numbers = results.tolist()
         indices: dict[str, float] = {}
         if rows is not None:
-            indices[SMALLEST_DISTANCE] = float(smallest_of(known.positions(ready, rows)).min())
-        indices |= ready.indices(numbers)
-        return Outcome(point.number, indices, None, known.cautions(ready, point, numbers))
+            distances = smallest_of(programs.positions(compiled, rows))
+            indices[SMALLEST_DISTANCE] = float(distances.min())
+        indices |= compiled.indices(numbers)
+        return Outcome(point.number, indices, None, programs.cautions(compiled, point, numbers))
 
     def table(self, point: Point) -> Table:
-        """A run with its rows.
+        """Make a run and return its rows.
 
         Raises:
             InputError: a component has refused.
 
         """
-        known, ready = self._known[point.scenario], self._ready(point)
-        point, experiment = known.plain(point), _experiment(point)
-        rows = np.empty((experiment.rows, 1 + len(ready.source.columns)))
+        programs = self._programs[point.scenario]
+        compiled = programs.compiled(point.order, point.step)
+        point, experiment = programs.plain(point), _experiment(point)
+        rows = np.empty((experiment.rows, 1 + len(compiled.source.columns)))
         try:
-            values = known.values(ready, point.parameters)
+            values = programs.values(compiled, point.parameters)
         except Refusal as refusal:
             raise InputError(str(refusal)) from None
-        if ready.program.run(values, experiment, rows) is None:
+        if compiled.program.run(values, experiment, rows) is None:
             raise InputError(f"{point.scenario}: a component has refused")
-        system = known.system.with_parameters(point.parameters)
+        system = programs.system.with_parameters(point.parameters)
         parameters = {
             name: variable.shown(system.value(name))
             for component in system.components.values()
@@ -359,7 +357,7 @@ class BatchEngine:
             for name in (PortName(component.name, variable.name),)
         }
         return Table.of(
-            Header(tuple(ready.source.columns), experiment, parameters), rows, Ending(None)
+            Header(tuple(compiled.source.columns), experiment, parameters), rows, Ending(None)
         )
 
 

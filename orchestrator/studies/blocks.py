@@ -1,7 +1,7 @@
-"""Runs in blocks: how many together, what makes them, and what comes back.
+"""Blocks of runs: their sizes, the workers that make them, and their outcomes.
 
-Processes of this machine make them, or threads where the engine leaves Python, or the workers of a
-Dask cluster (:mod:`.cluster`). A block whose process is lost is made again by another one.
+Workers are processes of this machine, threads if the engine releases Python's lock, or workers of a
+Dask cluster (:mod:`.cluster`). If a worker dies, another one repeats its block.
 """
 
 from __future__ import annotations
@@ -23,38 +23,36 @@ from orchestrator.machine.workers import Workers, cores
 from orchestrator.machine.workers import workers as workers_of
 from orchestrator.studies.engine import Engine, Outcome, Point
 
-#: How long a block shall take [s]: long beside the millisecond that a task costs, short for a user
-#: who waits for the last one, or loses it. One that takes so many times as long, because its runs
-#: take longer than the runs before them, comes back with what is done.
+#: Intended duration of a block [s], much longer than the millisecond that a task costs, but short
+#: for a user who waits for the last block, or loses it. A block that takes longer than this
+#: multiple is returned with the runs that are done.
 _SECONDS, _OVERTIME = 1.5, 2.0
 
-#: A scheduler shall not have to deal with more blocks a second than this: on large clusters they
-#: get longer.
+#: Largest number of blocks per second that a scheduler gets: on large clusters they are longer.
 _RATE = 200.0
 
-#: The most runs of a block, however fast they are.
+#: Largest number of runs in a block.
 _MOST_RUNS = 10_000
 
-#: How often a block may lose its process on this machine before it is put aside.
+#: Number of times that a block is repeated on this machine before its runs are made one by one.
 _LOSSES = 1
 
-#: What is said of a run that no worker has survived.
+#: Failure of a run that no worker has survived.
 FATAL = "every process that ran it died"
 
-#: What this process makes runs with, if it is a worker of this machine.
+#: The engine of this process, if it is a worker of this machine.
 _engine: list[Engine] = []
 
-#: How long a block has taken [s], and the outcomes of its runs, or of the first of them where all
-#: took too long.
+#: Duration of a block [s], and the outcomes of its runs, or of the first ones if it took too long.
 Answer = tuple[float, list[Outcome]]
 
 
-class Crew(Protocol):
-    """The workers that make blocks of runs.
+class BlockWorkers(Protocol):
+    """Workers that make blocks of runs.
 
     Attributes:
-        threads: how many runs are made at a time.
-        ahead: how many blocks may be under way for each of them.
+        threads: number of blocks that they make at the same time.
+        ahead: number of blocks that may be under way for each thread.
 
     """
 
@@ -64,13 +62,10 @@ class Crew(Protocol):
     def threads(self) -> int: ...
 
     def send(self, block: list[Point], limit: float) -> None:
-        """Have a block made, or what of it takes no longer than a limit [s]."""
+        """Start a block; after `limit` seconds the runs that are done are returned."""
 
     def receive(self) -> tuple[list[Point], Answer | None]:
-        """Wait for a block that was sent, and what has come of it.
-
-        Returns:
-            The block, and None where every process that made it has died.
+        """Wait for a block; return it with its answer, or None if all its processes died.
 
         Raises:
             InputError: no worker is left to make the runs, or the engine cannot.
@@ -80,11 +75,11 @@ class Crew(Protocol):
 
 
 @contextmanager
-def local_workers(n: int | None, engine: Engine) -> Iterator[Crew]:
-    """Processes of this machine, for the time of the context.
+def local_workers(n: int | None, engine: Engine) -> Iterator[BlockWorkers]:
+    """Start processes of this machine for the context.
 
     Args:
-        n: how many; None for one a core.
+        n: number of processes; None for one per core.
         engine: makes the runs.
 
     Raises:
@@ -104,7 +99,7 @@ def local_workers(n: int | None, engine: Engine) -> Iterator[Crew]:
 
 
 class _Sent(NamedTuple):
-    """A block that was sent, and how many more processes it may lose."""
+    """A block under way, its limit [s], and how many more times it may be repeated."""
 
     block: list[Point]
     limit: float
@@ -112,7 +107,7 @@ class _Sent(NamedTuple):
 
 
 class _Local:
-    """Processes of this machine, or threads of this one, and the task that makes a block there."""
+    """Processes of this machine, or threads of this process, and their task for a block."""
 
     ahead = 1
 
@@ -138,7 +133,7 @@ class _Local:
         return self._put_aside.pop(), None
 
     def _renew(self) -> None:
-        """Have what was under way made by other processes: all end with the one that has died."""
+        """Replace all processes, which end with the one that died, and repeat their blocks."""
         self._workers.renew()
         lost = [future for future in self._under_way if future.exception() is not None]
         for block, limit, left in [self._under_way.pop(future) for future in lost]:
@@ -149,12 +144,12 @@ class _Local:
 
 
 @contextmanager
-def local_threads(n: int | None, engine: Engine) -> Iterator[Crew]:
-    """Threads of this process, for the time of the context: for an engine that leaves Python.
+def local_threads(n: int | None, engine: Engine) -> Iterator[BlockWorkers]:
+    """Start threads for the context, for an engine that releases Python's lock.
 
     Args:
-        n: how many; None for one a core.
-        engine: makes the runs; several threads use it at the same time.
+        n: number of threads; None for one per core.
+        engine: makes the runs, in several threads at the same time.
 
     """
     n, ends = n or cores(), Event()
@@ -163,14 +158,14 @@ def local_threads(n: int | None, engine: Engine) -> Iterator[Crew]:
         try:
             yield _Local(threads, partial(answer, engine, ends=ends))
         finally:
-            # With the runs that are under way.
+            # Blocks stop after the run under way.
             ends.set()
             threads.close()
 
 
 def _set_up(engine: Engine) -> None:
     _engine.append(engine)
-    # Nothing of it belongs on the terminal where the study was started.
+    # FMUs must not print to the terminal of the study.
     for stream in (1, 2):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
@@ -180,7 +175,7 @@ def _task(block: list[Point], limit: float) -> Answer:
 
 
 def answer(engine: Engine, points: list[Point], limit: float, ends: Event | None = None) -> Answer:
-    """Make runs, or the first of them where all take longer than a limit [s], or nobody waits."""
+    """Make runs; stop after `limit` seconds, or if `ends` is set, and return what is done."""
     start, seconds, outcomes = monotonic(), 0.0, []
     for outcome in engine.outcomes(points):
         outcomes.append(outcome)
@@ -191,34 +186,34 @@ def answer(engine: Engine, points: list[Point], limit: float, ends: Event | None
 
 
 def cannot_make(block: list[Point], error: Exception) -> InputError:
-    """Return what is said of an engine that raises, or that lacks a package on the other side."""
+    """Return the error for an engine that raises, or that lacks a package on a worker."""
     if isinstance(error, InputError):
         return error
     numbers = f"{block[0].number} to {block[-1].number}"
     return InputError(f"runs {numbers} cannot be made: {reason(error)}")
 
 
-class Making:
-    """Blocks of runs on their way to workers and back."""
+class Blocks:
+    """Blocks of runs, sent to workers and received."""
 
-    def __init__(self, crew: Crew) -> None:
-        self._crew = crew
-        self._pace = float("inf")  # seconds for a step
+    def __init__(self, workers: BlockWorkers) -> None:
+        self._workers = workers
+        self._pace = float("inf")  # seconds per step
 
     def outcomes(self, points: Iterable[Point]) -> Iterator[list[Outcome]]:
-        """The outcomes of runs, block by block as they are done."""
+        """Yield the outcomes of runs, block by block as they are done."""
         lost: list[Point] = []
         for block, outcomes in self._made(self._blocks(points), self._room):
             if outcomes is None:
                 lost.extend(block)
             else:
                 yield outcomes
-        # One by one, so that none is blamed for another that ends the process of both.
+        # One by one, so that only the run that ends its process fails.
         for (point,), outcomes in self._made(([point] for point in lost), lambda: 1):
             yield outcomes or [Outcome(point.number, {}, FATAL)]
 
     def _blocks(self, points: Iterable[Point]) -> Iterator[list[Point]]:
-        """Runs in their order, as many together as make a task of a good length."""
+        """Yield runs in their order, in blocks of the intended duration."""
         block: list[Point] = []
         steps = 0.0
         for point in points:
@@ -233,12 +228,9 @@ class Making:
     def _made(
         self, blocks: Iterator[list[Point]], room: Callable[[], int]
     ) -> Iterator[tuple[list[Point], list[Outcome] | None]]:
-        """Blocks as they are done and their outcomes, or None where each worker has died.
+        """Yield blocks as they are done with their outcomes, or None if each worker died.
 
-        Args:
-            blocks: of runs.
-            room: how many blocks may be under way.
-
+        `room` returns the number of blocks that may be under way.
         """
         under_way = 0
         rests: deque[list[Point]] = deque()
@@ -248,13 +240,13 @@ class Making:
                 block = rests.popleft() if rests else next(blocks, None)
                 if block is None:
                     break
-                self._crew.send(block, _OVERTIME * self._seconds)
+                self._workers.send(block, _OVERTIME * self._seconds)
                 under_way += 1
-            # Now, when there is work again for the workers that have made them.
+            # Only now, when the workers have work again.
             yield from done
             if not under_way:
                 return
-            block, answer = self._crew.receive()
+            block, answer = self._workers.receive()
             under_way -= 1
             done = [(block, answer and answer[1])]
             if answer:
@@ -264,9 +256,9 @@ class Making:
                 self._pace = seconds / sum(point.steps for point in block[:n])
 
     def _room(self) -> int:
-        return max(1, self._crew.ahead * self._crew.threads)
+        return max(1, self._workers.ahead * self._workers.threads)
 
     @property
     def _seconds(self) -> float:
-        """How long a block shall take."""
-        return max(_SECONDS, self._crew.threads / _RATE)
+        """Intended duration of a block [s]."""
+        return max(_SECONDS, self._workers.threads / _RATE)

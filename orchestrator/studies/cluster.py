@@ -1,7 +1,4 @@
-"""The workers of a Dask cluster, which make blocks of runs.
-
-A block is a task of Dask; the outcomes of a block come back together.
-"""
+"""Workers of a Dask cluster, which make blocks of runs; each block is a task of Dask."""
 
 from __future__ import annotations
 
@@ -25,19 +22,19 @@ from distributed.utils import silence_logging_cmgr
 
 from auv_fmu import __version__
 from orchestrator.machine.errors import InputError, reason
-from orchestrator.studies.blocks import Answer, Crew, answer, cannot_make
+from orchestrator.studies.blocks import Answer, BlockWorkers, answer, cannot_make
 from orchestrator.studies.engine import Engine, Point
 
-#: How often workers are counted [s], and how long there may be none [s].
+#: Interval between counts of the workers, and time that there may be none [s].
 _GLANCE, _PATIENCE = 2.0, 120.0
 
-#: How the addresses of schedulers begin that ask for certificates.
+#: Beginnings of addresses of schedulers that require certificates.
 _ENCRYPTED = ("tls://", "wss://")
 
 
 @contextmanager
-def cluster(address: str, engine: Engine) -> Iterator[Crew]:
-    """The workers of a scheduler, for the time of the context.
+def cluster(address: str, engine: Engine) -> Iterator[BlockWorkers]:
+    """Use the workers of a scheduler for the context.
 
     Args:
         address: of the scheduler.
@@ -48,12 +45,12 @@ def cluster(address: str, engine: Engine) -> Iterator[Crew]:
 
     """
     with silence_logging_cmgr(CRITICAL), _connected(address) as client:
-        # Under a unique name: another client may be at the same study.
+        # Under a unique name: another client may run the same study.
         name = f"auv-fmu-{client.id}"
         try:
             client.register_plugin(_Share(engine), name)
         except Exception as error:
-            # Whatever is raised by a worker with other packages than this process has.
+            # A worker with other packages than this process may raise anything.
             raise InputError(f"a worker cannot take the study: {reason(error)}") from error
         try:
             yield _Cluster(client, name)
@@ -74,7 +71,7 @@ def _connected(address: str) -> Iterator[Client]:
             f"no scheduler answers at {address or repr(address)}: {reason(error)}; an address is "
             "like tcp://HOST:PORT"
         ) from error
-    # A client that cannot connect would wait for a minute to be closed.
+    # A client that cannot connect would take a minute to close.
     if failure := _failure_to_connect(address):
         raise InputError(f"no scheduler answers at {address}: {reason(failure)}") from failure
     try:
@@ -86,7 +83,7 @@ def _connected(address: str) -> Iterator[Client]:
 
 
 def _failure_to_connect(address: str) -> Exception | None:
-    """Why there is no connection to a scheduler; None: there is."""
+    """Return the error of a connection to a scheduler, or None if it succeeds."""
     errors: SimpleQueue[Exception | None] = SimpleQueue()
 
     async def connected() -> None:
@@ -94,7 +91,7 @@ def _failure_to_connect(address: str) -> Exception | None:
         secrets = Security().get_connection_args("client")
         if address.startswith(_ENCRYPTED) and secrets["ssl_context"] is None:
             raise ValueError("name certificates in Dask's configuration, distributed.comm.tls")
-        # What answers need not be a scheduler, and may say nothing.
+        # The other end may be no scheduler, and never answer.
         comm = await asyncio.wait_for(connect(address, seconds, **secrets), 2 * seconds)
         comm.abort()
 
@@ -104,22 +101,22 @@ def _failure_to_connect(address: str) -> Exception | None:
         except Exception as error:
             errors.put(error)
 
-    # Where this is called, a loop may be running.
+    # In a thread, since the caller may have a running event loop.
     Thread(target=tried, daemon=True).start()
     return errors.get()
 
 
 class _Share(WorkerPlugin):  # type: ignore[misc]
-    """What every worker has of a study, those included that come while it is under way.
+    """The engine on every worker, including those that join later.
 
-    The scheduler has it in its keeping: it is not lost with a worker, as scattered data would be.
+    The scheduler keeps it: unlike scattered data, it is not lost with a worker.
     """
 
     def __init__(self, engine: Engine) -> None:
         self._engine, self._version = engine, __version__
 
     def setup(self, worker: Any) -> None:
-        # Runs of one process are made one after the other: an FMU is a library of the process.
+        # One run at a time in each process: an FMU is a library of the process.
         self._lock, self._address = Lock(), worker.address
 
     def answer(self, points: list[Point], limit: float) -> Answer:
@@ -133,15 +130,15 @@ class _Share(WorkerPlugin):  # type: ignore[misc]
 
 
 def _task(name: str, points: bytes, limit: float) -> Answer:
-    """Make some runs, pickled so that nothing on the way looks into them."""
+    """Make runs, which are pickled so that Dask does not traverse them."""
     share: _Share = get_worker().plugins[name]
     return share.answer(pickle.loads(points), limit)
 
 
 class _Cluster:
-    """The workers of a scheduler; a block is a task of Dask."""
+    """The workers of a scheduler."""
 
-    #: The block that a thread makes, and the one that is next.
+    #: The block that a thread makes, and the next.
     ahead = 2
 
     def __init__(self, client: Client, name: str) -> None:
@@ -170,7 +167,7 @@ class _Cluster:
         except CancelledError as error:
             raise _gone("scheduler") from error
         except TimeoutError as error:
-            # The worker was lost between its word that the block is done and the block.
+            # The worker was lost after it had reported the block as done.
             raise _gone("last worker") from error
         except Exception as error:
             raise cannot_make(block, error) from error
@@ -182,10 +179,10 @@ class _Cluster:
             self._count()
 
     def _count(self) -> None:
-        """Count the workers' threads now and then.
+        """Count the workers' threads, if the last count is old.
 
         Raises:
-            InputError: there have been none for long.
+            InputError: there have been none for too long.
 
         """
         now = monotonic()

@@ -1,8 +1,7 @@
-"""A run of a study, what comes out of it, and what an engine is.
+"""Runs of a study, their outcomes, and the engine that makes them with FMUs.
 
-There are two engines. The one here runs FMUs, of any system. The other (:mod:`.batch_engine`) runs
-a system of components in the language of equations as one compiled program. Both give the same
-numbers.
+The other engine (:mod:`.batch_engine`) runs a system of components in the language of equations as
+one compiled program. Both give the same numbers.
 """
 
 from __future__ import annotations
@@ -29,9 +28,9 @@ class Point(NamedTuple):
     """One run of a study.
 
     Attributes:
-        number: within the study, from 0.
+        number: in the study, from 0.
         scenario: name or path.
-        parameters: what it changes, by `component.parameter`, with the scenario's own left out.
+        parameters: by `component.parameter`, without those of the scenario.
         stop_time, step: of the experiment [s].
         order: of evaluation.
         start_time: of the experiment [s].
@@ -53,14 +52,13 @@ class Point(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """What comes out of a run.
+    """The outcome of a run.
 
     Attributes:
         number: of the run.
-        indices: by their columns, :func:`.index_columns`; none of a run that has failed.
-        failure: why the run ended early, or None.
-        cautions: what to be wary of, of :data:`.cautions.CAUTIONS`, with commas between them; None:
-            nothing.
+        indices: by their columns, :func:`.index_columns`; none if the run failed.
+        failure: reason why the run ended early, or None.
+        cautions: keys of :data:`.cautions.CAUTIONS` with commas between them, or None.
 
     """
 
@@ -71,39 +69,29 @@ class Outcome(NamedTuple):
 
 
 def kinds_of(cautions: Iterable[Caution]) -> str | None:
-    """The kinds of some cautions, each once, as an outcome has them."""
+    """Return the kinds of some cautions as text for an outcome."""
     return ", ".join(dict.fromkeys(caution.kind for caution in cautions)) or None
 
 
 class Engine(Protocol):
     """Makes runs.
 
-    It is pickled, and travels to workers with everything that it needs, FMUs included: they share
-    no file system with the process that sends it. What is unpacked or compiled on a worker is kept
-    there for the runs that follow.
-
-    Attributes:
-        digest: of what the numbers depend on besides the identities of what is run.
-
+    An engine is pickled and sent to workers with everything that it needs, including FMUs, since
+    workers need not share a file system with the sender. Workers keep what they unpack or compile.
     """
 
     @property
     def digest(self) -> str:
-        """A text in hexadecimal digits."""
+        """Hash of the code, on which the numbers depend besides the systems."""
         ...
 
     def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
-        """Make some runs, in their order.
-
-        Args:
-            points: of the study that the engine was made for.
-
-        """
+        """Make runs of the study that the engine was made for, in their order."""
         ...
 
 
 class FmuEngine:
-    """Makes runs with FMUs in the process that it is called in; it takes them along."""
+    """Makes runs with FMUs in the calling process."""
 
     def __init__(
         self,
@@ -111,26 +99,26 @@ class FmuEngine:
         loop: str = Plan.LOOPS[0],
         own: Sequence[OwnIndex] = (),
     ) -> None:
-        """Take what is run.
+        """Make an engine.
 
         Args:
-            prepared: by the names that runs have for their scenarios.
+            prepared: runs by the names of their scenarios.
             loop: that makes the steps, one of :attr:`.Plan.LOOPS`.
-            own: indices of the user's own.
+            own: the user's own indices.
 
         """
         self._prepared, self._loop, self._own = dict(prepared), loop, own
 
     @property
     def digest(self) -> str:
-        """Of the code that says what comes out of rows."""
+        """Hash of the code that computes the indices."""
         return code_of("orchestrator.vehicle", "orchestrator.studies")
 
     def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
-        """Make some runs, in their order.
+        """Make runs, in their order.
 
         Raises:
-            KeyboardInterrupt: a signal has come to stop it.
+            KeyboardInterrupt: there was a signal to stop.
 
         """
         for point in points:
@@ -148,22 +136,22 @@ class FmuEngine:
             prepared.experiment, stop_time=point.stop_time, step=point.step, order=point.order
         )
         loops = loops_of(system)
-        own = [*chain(*(one.indices for one in self._own))]
+        own = [*chain(*(file.indices for file in self._own))]
         indices, watch = Indices(loops, own=own), Watch(loops)
         plan = make_plan(system, experiment, loop=self._loop)
         ending = replace(prepared, plan=plan).run([indices, watch])
         if ending.interrupts:
             raise KeyboardInterrupt
-        wary = kinds_of([*cautions(values_of(system), point.step, loops), *watch.found()])
+        kinds = kinds_of([*cautions(values_of(system), point.step, loops), *watch.found()])
         if ending.failure is not None:
-            return Outcome(point.number, {}, ending.failure, wary)
+            return Outcome(point.number, {}, ending.failure, kinds)
         values = indices.values()
         if failures := indices.failures:
-            return Outcome(point.number, {}, f"index {failures[0]}", wary)
-        return Outcome(point.number, values, None, wary)
+            return Outcome(point.number, {}, f"index {failures[0]}", kinds)
+        return Outcome(point.number, values, None, kinds)
 
     def __getstate__(self) -> dict[str, Any]:
-        """With the FMUs, each once, by their digests.
+        """Return the state with the content of the FMUs, each once, by their hashes.
 
         Raises:
             InputError: one has changed since it was read.
@@ -174,24 +162,23 @@ class FmuEngine:
             for prepared in self._prepared.values()
             for part in prepared.system.components.values()
         }
-        kept = {"prepared": self._prepared, "loop": self._loop, "own": self._own}
-        return {**kept, "archives": archives}
+        state = {"prepared": self._prepared, "loop": self._loop, "own": self._own}
+        return {**state, "archives": archives}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Put the FMUs where this process keeps what is temporary."""
-        places = {digest: _place(digest, content) for digest, content in state["archives"].items()}
+        """Write the FMUs into the temporary folder of this process."""
         self._prepared, self._loop, self._own = {}, state["loop"], state["own"]
         for name, prepared in state["prepared"].items():
             components = {
-                part.name: replace(part, fmu=places[part.digest])
+                part.name: replace(part, fmu=_written(part.digest, state["archives"][part.digest]))
                 for part in prepared.system.components.values()
             }
             system = replace(prepared.system, components=components)
             self._prepared[name] = replace(prepared, plan=replace(prepared.plan, system=system))
 
 
-def _place(digest: str, content: bytes) -> Path:
-    """Where an FMU lies that has come from elsewhere."""
+def _written(digest: str, content: bytes) -> Path:
+    """Write an FMU unless it is there; return its path."""
     path = process_folder() / f"{digest}.fmu"
     if not path.exists():
         path.write_bytes(content)

@@ -1,4 +1,4 @@
-"""Indices of the user's own: a figure of a study names a file beside it."""
+"""The user's own indices, in files next to a study whose names its figures show."""
 
 from __future__ import annotations
 
@@ -20,28 +20,25 @@ from orchestrator.figures.study_values import is_known, names_of
 from orchestrator.machine.children import run_module
 from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, last_line, reason
-from orchestrator.studies.study import Study
-from orchestrator.studies.study_file import LABELS, listed
+from orchestrator.studies.study import LABELS, Study, listed
 from orchestrator.vehicle.indices import INDICES, Index, index_columns
 from orchestrator.vehicle.reduction import sources_of
 from orchestrator.vehicle.signals import Loop, loops_of
 
-#: What a name begins with that may be that of a file.
+#: A name of a file at the beginning of a value.
 _STEM = re.compile(r"[A-Za-z_]\w*", re.ASCII)
 
-#: What is beside an index of one's own.
+#: Reason why a file cannot import another one.
 _ALONE = "an index is one file, which imports what is installed"
 
 
 @dataclass(frozen=True)
 class OwnIndex:
-    """An index of the user's own, or several in one file.
-
-    It travels as its text; what is made of it is made where it is needed.
+    """A file with one or several indices of the user's own; it is pickled as text.
 
     Attributes:
-        name: of the file, without its ending.
-        text: that the file holds.
+        name: stem of the file.
+        text: content of the file.
 
     """
 
@@ -50,33 +47,33 @@ class OwnIndex:
 
     @property
     def digest(self) -> str:
-        """Of the text."""
+        """Hash of the text."""
         return hashlib.sha256(self.text).hexdigest()
 
     @cached_property
     def reducer(self) -> Reducer:
-        """What its hooks say."""
+        """The functions of the file."""
         return read_reducer(_module(self))
 
     @property
     def indices(self) -> tuple[Index, ...]:
-        """What it gives."""
+        """The indices in the file."""
         return tuple(
             Index(name, name.replace("_", " "), self.reducer) for name in self.reducer.results
         )
 
     def __getstate__(self) -> Mapping[str, object]:
-        """Without what was made of the text."""
+        """Return the text, without the reducer made of it."""
         return {"name": self.name, "text": self.text}
 
 
 @cache
 def _module(own: OwnIndex) -> ModuleType:
-    """The module of an index, in this process."""
+    """Import the text of a file as a module of this process."""
     file = process_folder() / own.digest[:16] / f"{own.name}.py"
     file.parent.mkdir(exist_ok=True)
     file.write_bytes(own.text)
-    # Another study in this process may have another index of this name.
+    # Another study of this process may have another file of this name.
     name = f"index_{own.digest[:16]}.{own.name}"
     specification = spec_from_file_location(name, file)
     assert specification is not None and specification.loader is not None
@@ -87,16 +84,13 @@ def _module(own: OwnIndex) -> ModuleType:
 
 
 def read_own_index(path: Path) -> OwnIndex:
-    """An index of the user's own.
-
-    Args:
-        path: of its file.
+    """Read a file with the user's own indices.
 
     Raises:
-        Refused: it is none; with all that is wrong with it.
+        Refused: there are problems in it.
 
     """
-    # It is imported by a separate process first, because it may be any Python.
+    # A separate process imports it first, because it may contain any Python.
     process = run_module("fmus.check", "--index", str(path))
     findings = Findings()
     for text in process.stdout.splitlines():
@@ -113,34 +107,37 @@ def read_own_index(path: Path) -> OwnIndex:
 
 
 def own_indices(study: Study, systems: Mapping[str, System]) -> tuple[OwnIndex, ...]:
-    """The indices of the user's own that the figures of a study show.
+    """Return the user's own indices that the figures of a study show.
 
     Args:
-        study: whose file they stand beside.
-        systems: that it runs, by the names that it has for them.
+        study: in the folder of the files.
+        systems: that it runs, by their names in the study.
 
     Raises:
-        Refused: a file is no index, has the name of another, or takes what no system has.
+        Refused: a file has no index, an index has the name of another, or an input that no system
+            has.
 
     """
     if study.folder is None:
         return ()
     loops = {name: loops_of(system) for name, system in systems.items()}
     known = [*study.varied, *chain(*map(index_columns, loops.values()))]
-    wanted = (value for value in _shown(study) if not is_known(value, known))
-    names = [name for value in wanted for name in names_of(value) if not is_known(name, known)]
+    unknown = (value for value in _shown(study) if not is_known(value, known))
+    names = [name for value in unknown for name in names_of(value) if not is_known(name, known)]
     prefixes = {"": None} | {f"{loop.name}.": None for loop in chain(*loops.values())}
-    components = {name.partition(".")[0] for one in systems.values() for name in one.components}
+    components = {
+        name.partition(".")[0] for system in systems.values() for name in system.components
+    }
     stems = {
-        found[0]: None
+        match[0]: None
         for name in names
         for prefix in prefixes
-        if name.startswith(prefix) and (found := _STEM.match(name, len(prefix)))
+        if name.startswith(prefix) and (match := _STEM.match(name, len(prefix)))
     }
     findings, every = Findings(), list[OwnIndex]()
     for stem in stems:
         path = study.folder / f"{stem}.py"
-        # A component may have a file here, too.
+        # A file may also belong to a component.
         if stem not in components and path.is_file():
             with findings.collecting():
                 own = read_own_index(path)
@@ -152,14 +149,9 @@ def own_indices(study: Study, systems: Mapping[str, System]) -> tuple[OwnIndex, 
 
 
 def _check_names(path: Path, own: OwnIndex, others: Sequence[OwnIndex]) -> None:
-    """Hold the names of indices apart.
-
-    Raises:
-        InputError: another index has the name of one.
-
-    """
+    """Raise an InputError if another index has the name of one."""
     taken = {index.name: "auv-fmu" for index in INDICES}
-    taken |= {index.name: f"{one.name}.py" for one in others for index in one.indices}
+    taken |= {index.name: f"{other.name}.py" for other in others for index in other.indices}
     for index in own.indices:
         if index.name in taken:
             raise InputError(f"{path}: {taken[index.name]} has an index {index.name}; rename it")
@@ -171,12 +163,7 @@ def _check_inputs(
     systems: Mapping[str, System],
     loops: Mapping[str, Sequence[Loop]],
 ) -> None:
-    """Check that a system of the study has what an index takes.
-
-    Raises:
-        InputError: none has, or it is of another type.
-
-    """
+    """Raise an InputError if no system of the study has the inputs of an index."""
     without = ""
     for name, system in systems.items():
         variables = dict(_variables(system))
@@ -196,7 +183,7 @@ def _check_inputs(
 
 
 def _variables(system: System) -> Iterator[tuple[str, Variable]]:
-    """What rows and parameters of a run are of, by their names."""
+    """Yield the variables of rows and parameters of a run with their names."""
     for component in system.components.values():
         for causality in ("output", "input", "parameter"):
             for variable in component.having(causality):
@@ -204,7 +191,7 @@ def _variables(system: System) -> Iterator[tuple[str, Variable]]:
 
 
 def _shown(study: Study) -> Iterator[str]:
-    """The values that the figures of a study show."""
+    """Yield the values that the figures of a study show."""
     for name, table in study.figures.items():
         if name != LABELS:
             for key in ("x", "y", "show", "limits"):
@@ -214,25 +201,28 @@ def _shown(study: Study) -> Iterator[str]:
 def with_fields(
     figures: Mapping[str, Any], own: Sequence[OwnIndex], columns: Sequence[str]
 ) -> dict[str, Any]:
-    """The figures of a study with the indices of a file, of all vehicles, where they name the file.
+    """Return the figures of a study with the indices of all vehicles instead of names of files.
 
     Args:
-        figures: that the study file has.
-        own: the indices of the user's own.
-        columns: of what comes out of a run.
+        figures: of the study file.
+        own: the user's own indices.
+        columns: of indices.
 
     """
-    of = {
-        one.name: [
+    indices = {
+        file.name: [
             name
-            for index in one.indices
+            for index in file.indices
             for name in dict.fromkeys(_group(column, index.name) for column in columns)
             if name
         ]
-        for one in own
+        for file in own
     }
     return {
-        name: {**table, "show": [*chain(*(of.get(one, [one]) for one in listed(table["show"])))]}
+        name: {
+            **table,
+            "show": [*chain(*(indices.get(value, [value]) for value in listed(table["show"])))],
+        }
         if name != LABELS and "show" in table
         else table
         for name, table in figures.items()
@@ -240,6 +230,6 @@ def with_fields(
 
 
 def _group(column: str, index: str) -> str:
-    """The index, with its vehicle, that a column is of; empty: it is of another."""
-    found = re.fullmatch(rf"((?:.+\.)?{index})(?:\.\w+|\[[\d,]+\])?", column)
-    return found[1] if found else ""
+    """Return the index of a column with its vehicle; empty for a column of another index."""
+    match = re.fullmatch(rf"((?:.+\.)?{index})(?:\.\w+|\[[\d,]+\])?", column)
+    return match[1] if match else ""

@@ -1,4 +1,4 @@
-"""The runs of a study: which values each of them has."""
+"""The runs of a study: the values of each."""
 
 from __future__ import annotations
 
@@ -32,24 +32,24 @@ from orchestrator.studies.study import (
 from orchestrator.vehicle.indices import Index, index_columns, index_units
 from orchestrator.vehicle.signals import loops_of
 
-#: Types of values by the types of FMI's variables.
+#: Types of values by the types of FMI variables.
 _TYPES = {"Real": float, "Integer": int, "Enumeration": str, "Boolean": bool, "String": str}
 
 
 class Space:
     """The runs of a study by their numbers.
 
-    A run is a combination of `vary`, whose last value changes fastest, one of the samples, and
-    one of the scenarios. Its number says which, and so fixes all its values.
+    A run is a combination of `vary` (the last value changes fastest), a sample (next fastest) and a
+    scenario (fastest of all). All its values follow from its number.
 
     Attributes:
-        columns: the types of what varies, by name.
-        prepared: the shortest run of each scenario, by its name.
-        indices: the columns of what comes out of the runs.
-        has_scenarios: whether there are several.
-        units: of what varies, as the FMUs write them, and of indices of the user's own; empty
-            where there is none.
-        logarithmic: whether what is sampled is drawn by its logarithm.
+        columns: types of the values that vary, by name.
+        prepared: shortest run of each scenario, by the scenario's name.
+        indices: columns of indices.
+        has_scenarios: True if there are several.
+        units: of values that vary, as the FMUs write them, and of the user's own indices; empty
+            without a unit.
+        logarithmic: True for values that are sampled by their logarithm.
 
     """
 
@@ -59,19 +59,19 @@ class Space:
         systems: Mapping[str, tuple[Scenario, System]],
         own: Sequence[Index] = (),
     ) -> None:
-        """Check a study against the systems that it runs, and type its values.
+        """Check a study with its systems, and convert its values to the types of FMI.
 
         Args:
-            study: whose runs they are.
-            systems: of its scenarios, by the names that it has for them.
-            own: indices of the user's own.
+            study: of the runs.
+            systems: of its scenarios, by name.
+            own: the user's own indices.
 
         Raises:
             InputError: a name does not exist, or a value has the wrong type.
 
         """
         findings = Findings()
-        known = _Known([system for _, system in systems.values()])
+        known = _Names([system for _, system in systems.values()])
         self._stop_time, self._scenarios = study.stop_time, tuple(study.scenario)
         self.has_scenarios = len(self._scenarios) > 1
         self.columns: dict[str, type[Value]] = {}
@@ -82,10 +82,14 @@ class Space:
         self._grid: dict[str, tuple[Value, ...]] = {}
         for name, values in study.vary.items():
             with findings.collecting():
-                self._grid[name] = _unlike(name, [known.typed(name, value) for value in values])
+                typed = tuple(known.typed(name, value) for value in values)
+                [(value, n)] = Counter(typed).most_common(1)
+                if n > 1:
+                    raise InputError(f"vary: {name}: {literal(value)} is stated twice")
+                self._grid[name] = typed
         self._ranges = study.sample.ranges if study.sample else {}
         self.logarithmic = {
-            name: range_of.spacing == LOG_SPACING for name, range_of in self._ranges.items()
+            name: limits.spacing == LOG_SPACING for name, limits in self._ranges.items()
         }
         self._limits = {
             name: limits[:2] if key == name else (-max(limits[:2]), max(limits[:2]))
@@ -132,19 +136,14 @@ class Space:
             self.units |= index_units(index, loops)
 
     def _prepared(self, name: str, study: Study, scenario: Scenario, system: System) -> Prepared:
-        """The shortest run of a scenario, which can be prepared like any run of it."""
+        """Prepare the shortest run of a scenario."""
         _, chosen = self.chosen(0)
         shortest = study.stop_time and study.stop_time.base + sum(
             min(rate * end for end in self._ends(varied))
             for varied, rate in study.stop_time.per.items()
         )
-        values = {
-            target: value
-            for target, value in {**self._constants, **chosen}.items()
-            if target in self._has[name]
-        }
         request = Request(
-            parameters=values,
+            parameters=self._parameters(name, chosen),
             stop_time=shortest,
             step=chosen.get(STEP, study.step),
             order=study.order,
@@ -155,31 +154,36 @@ class Space:
         return prepared
 
     def _ends(self, name: str) -> Sequence[float]:
-        """The values of a grid, or the two ends of a range."""
+        """Return the values of a grid, or the two ends of a range."""
         return [float(value) for value in self._grid.get(name) or self._limits[name]]
 
+    def _parameters(self, scenario: str, chosen: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the parameters of a run that its scenario has."""
+        has = self._has[scenario]
+        return {name: value for name, value in {**self._constants, **chosen}.items() if name in has}
+
     def __len__(self) -> int:
-        """How many runs there are."""
+        """Return the number of runs."""
         return self._n
 
     def __getitem__(self, number: int) -> Point:
-        """One of the runs."""
+        """Return a run."""
         if not 0 <= number < self._n:
             raise IndexError(number)
         scenario, chosen = self.chosen(number)
-        experiment, has = self.prepared[scenario].experiment, self._has[scenario]
+        experiment = self.prepared[scenario].experiment
         return Point(
             number,
             scenario,
-            {name: value for name, value in {**self._constants, **chosen}.items() if name in has},
-            self._stop_time.of(chosen) if self._stop_time else experiment.stop_time,
+            self._parameters(scenario, chosen),
+            self._stop_time.at(chosen) if self._stop_time else experiment.stop_time,
             chosen.get(STEP, experiment.step),
             experiment.order,
             experiment.start_time,
         )
 
     def chosen(self, number: int) -> tuple[str, dict[str, Any]]:
-        """The scenario of a run, and what varies, by name."""
+        """Return the scenario of a run, and the values that vary, by name."""
         place, scenario = divmod(number, len(self._scenarios))
         combination, sample = divmod(place, len(self._points))
         chosen: dict[str, Any] = {}
@@ -189,79 +193,71 @@ class Space:
         shares = iter(self._points[sample].tolist())
         for key, limits in self._ranges.items():
             size = between(limits, next(shares), self.columns[norm_members(key)[0]] is int)
-            chosen |= zip(norm_members(key), _directed(key, size, shares), strict=True)
+            chosen |= zip(norm_members(key), _direct(key, size, shares), strict=True)
         return self._scenarios[scenario], chosen
 
     @property
     def digest(self) -> str:
-        """Of all values that vary: other runs have another one."""
+        """Hash of all values that vary."""
         content = repr((self._grid, self._ranges)).encode() + self._points.tobytes()
         return sha256(content).hexdigest()
 
 
-class _Known:
-    """What some systems know of the values that a study names: one of them must know each."""
+class _Names:
+    """Names that a study may use: the step, and all names of at least one of its systems."""
 
     def __init__(self, systems: Sequence[System]) -> None:
         self._systems = systems
 
     def value_type(self, name: str) -> type[Value]:
-        """The type of a value."""
+        """Return the type of a value."""
         return float if name == STEP else _TYPES[self._variable(name).family]
 
     def unit(self, name: str) -> str:
-        """The unit of a value; empty: it has none, or not the same in all systems."""
+        """Return the unit of a value; empty without a unit, or if systems have different ones."""
         if name == STEP:
             return "s"
         target = PortName.read(name)
-        having = [(one, one.named(target)) for one in self._systems if one.has(target)]
-        units = {one.component(of.component).variable(of.port).unit or "" for one, of in having}
+        units = {
+            _variable(system, target).unit or "" for system in self._systems if system.has(target)
+        }
         return units.pop() if len(units) == 1 else ""
 
     def typed(self, name: str, value: Any) -> Value:
-        """A value in its type; that of an Enumeration by its name."""
+        """Convert a value to its type; for an Enumeration, to the name of the item."""
         if name != STEP:
             variable = self._variable(name)
-            found: Value = variable.shown(variable.typed(value, name))
-            return found
+            shown: Value = variable.shown(variable.typed(value, name))
+            return shown
         if not is_finite(value):
             raise InputError(f"{STEP} = {shortened(repr(value))}: not a number of seconds")
         return float(value)
 
     def expanded(self, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Values by ports only, as the first system has them that has a port."""
+        """Return values by single ports, expanded by the first system that has the port."""
         stated = {PortName.read(name): value for name, value in values.items()}
-        found: dict[str, Any] = {}
+        ports: dict[str, Any] = {}
         unknown = dict.fromkeys(map(str, stated))
         for system in reversed(self._systems):
-            of_it = system.expanded(stated)
-            found |= {str(port): value for port, value in of_it.items() if system.has(port)}
-            absent = {str(port) for port in of_it if not system.has(port)}
+            expanded = system.expanded(stated)
+            ports |= {str(port): value for port, value in expanded.items() if system.has(port)}
+            absent = {str(port) for port in expanded if not system.has(port)}
             unknown = {name: None for name in unknown if name in absent}
-        return {**{name: values[name] for name in unknown}, **found}
+        return {**{name: values[name] for name in unknown}, **ports}
 
     def _variable(self, name: str) -> Variable:
         target = PortName.read(name)
-        system = next((one for one in self._systems if one.has(target)), self._systems[-1])
-        target = system.named(target)
-        return system.component(target.component).variable(target.port)
+        having = (system for system in self._systems if system.has(target))
+        return _variable(next(having, self._systems[-1]), target)
 
 
-def _unlike(name: str, values: Sequence[Value]) -> tuple[Value, ...]:
-    """Values of a grid, each of which makes other runs.
-
-    Raises:
-        InputError: one is there twice.
-
-    """
-    if len(set(values)) < len(values):
-        [(value, _)] = Counter(values).most_common(1)
-        raise InputError(f"vary: {name}: {literal(value)} is stated twice")
-    return tuple(values)
+def _variable(system: System, name: PortName) -> Variable:
+    target = system.named(name)
+    return system.component(target.component).variable(target.port)
 
 
 def between(limits: Range, share: float, whole: bool) -> float | int:
-    """The value at a share of a range; of whole numbers each has the same chance."""
+    """Return the value at a share of a range; whole numbers have equal shares."""
     low, high, spacing = limits
     if whole:
         low, high = min(low, high), max(low, high) + 1
@@ -269,8 +265,8 @@ def between(limits: Range, share: float, whole: bool) -> float | int:
     return min(floor(value), int(high) - 1) if whole else value
 
 
-def _directed(key: str, size: float, shares: Iterator[float]) -> tuple[float, ...]:
-    """The members of a norm, in a direction that the next shares make: each is as likely."""
+def _direct(key: str, size: float, shares: Iterator[float]) -> tuple[float, ...]:
+    """Return the members of a norm, with a direction from the next shares, evenly distributed."""
     if (n := len(norm_members(key))) == 1:
         return (size,)
     angle = 2.0 * pi * next(shares)
@@ -280,10 +276,10 @@ def _directed(key: str, size: float, shares: Iterator[float]) -> tuple[float, ..
 
 
 def draw_shares(sample: Sample) -> np.ndarray:
-    """Shares of the ranges, (samples, values); a sample is what seed and method make it.
+    """Return shares of the ranges, (samples, values), which follow from the seed and the method.
 
     Raises:
-        InputError: the method cannot draw that many.
+        InputError: the method cannot draw so many.
 
     """
     from scipy.stats import qmc  # noqa: PLC0415
@@ -292,7 +288,7 @@ def draw_shares(sample: Sample) -> np.ndarray:
     generator = np.random.default_rng(sample.seed)
     try:
         if sample.method == SOBOL:
-            # As many as it is made for, of which the first are taken.
+            # The first of a power of two, for which the sequence is made.
             points: np.ndarray = qmc.Sobol(width, rng=generator).random_base2(ceil(log2(n)))[:n]
         elif sample.method == LATIN_HYPERCUBE:
             points = qmc.LatinHypercube(width, rng=generator).random(n)

@@ -1,4 +1,4 @@
-"""A study as a whole: its runs, what makes them, and what is left of them."""
+"""A study as a whole: checked and prepared, run, published and drawn."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.cosim import Plan, System
-from orchestrator.figures.study_values import FigureEntry
+from orchestrator.figures.study_values import FigureEntry, Values
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import PACKAGES
@@ -26,40 +26,47 @@ from orchestrator.runs.preparation import Prepared, load_scenario
 from orchestrator.runs.request import FORCE, KIND, LOOP, option
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
-from orchestrator.studies.blocks import Making, local_threads, local_workers
+from orchestrator.studies.blocks import Blocks, local_threads, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
 from orchestrator.studies.own_indices import OwnIndex, own_indices, with_fields
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import Store, open_store
-from orchestrator.studies.study import BATCH, ENGINES, FMU, EngineName, Study
-from orchestrator.studies.study_file import read_figures, read_study, study_of
-from orchestrator.studies.study_result import StudyResult, read_study_record
+from orchestrator.studies.store import Store, StudyResult, open_store, read_study_record
+from orchestrator.studies.study import (
+    BATCH,
+    ENGINES,
+    FMU,
+    EngineName,
+    Study,
+    read_figures,
+    read_study,
+    study_of,
+)
 
-#: Packages whose versions the runs and their table depend on.
-_PACKAGES = (*PACKAGES, "pyarrow", "scipy")
-
-#: What a study says of its runs.
-_STATED = ("vary", "sample", "parameters", "stop_time", "step", "order")
-
-#: What a study needs besides.
+#: Packages that studies need in addition to runs.
 _NEEDED = ("pyarrow", "scipy")
 
-#: Fewer runs than this are not worth a word on what would make them faster.
+#: Packages whose versions are recorded.
+_RECORDED = (*PACKAGES, *_NEEDED)
+
+#: Attributes of a study that are recorded.
+_STATED = ("vary", "sample", "parameters", "stop_time", "step", "order")
+
+#: Number of runs from which a faster way is suggested.
 _MANY = 100
 
-#: Seconds before a bar appears.
+#: Seconds before a progress bar appears.
 _PATIENCE = 2.0
 
-#: The name of a study that has no file.
+#: Name of a study without a file.
 _NAMELESS = "study"
 
 
 @dataclass(frozen=True)
 class Means:
-    """How the runs of a study are made.
+    """Options of making the runs of a study.
 
     Raises:
-        InputError: its entries do not go together.
+        InputError: two options exclude each other.
 
     """
 
@@ -133,7 +140,7 @@ def sweep(
 
 
 def study_folder(study: Study, out: str | Path | None) -> Path:
-    """Where a study goes."""
+    """Return the folder of a study."""
     return Path("results", study.stem) if out is None else Path(out)
 
 
@@ -145,73 +152,63 @@ def complete_study(
     say: Callable[[str], None] = lambda _: None,
     progress: bool = False,
 ) -> StudyResult:
-    """Make what is missing of a study, and draw it.
+    """Make the missing runs of a study, publish them and draw the figures.
 
     Args:
-        study: which.
-        means: how.
+        study: to run.
+        means: options.
         folder: for its files.
         command: for the record.
-        say: takes notes for the user.
+        say: receives notes for the user.
         progress: show a bar.
 
     Raises:
-        InputError: something about the study is not usable, or its files cannot be written.
-        KeyboardInterrupt: a signal has come to stop it.
+        InputError: the study cannot be run, or its files cannot be written.
+        KeyboardInterrupt: there was a signal to stop.
 
     """
-    # What is only checked draws nothing.
+    # Lazily, since `check` needs no matplotlib.
     from orchestrator.figures.study_figures import draw_figures, figure_files  # noqa: PLC0415
 
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
     kind = _kind_begun(folder) if means.kind == AUTO else means.kind
-    means, systems, space, entries, engine, own = prepare_study(study, replace(means, kind=kind))
-    scenarios = [scenario for scenario, _ in systems.values()]
-    record = _record(study, means, space, engine, scenarios, command, own)
-    with open_store(folder, record, space.indices, means.force) as kept:
-        kept.ledger.check(figure_files(entries))
-        if not kept.is_done:
-            if not len(kept) and (hint := faster(space, engine, means, own)):
+    ready = prepare_study(study, replace(means, kind=kind))
+    space, engine = ready.space, ready.engine
+    record = _record(study, ready, command)
+    with open_store(folder, record, space.indices, means.force) as store:
+        store.ledger.check(figure_files(ready.figures))
+        if not store.is_done:
+            if not len(store) and (hint := faster(space, engine, ready.means, ready.own)):
                 say(hint)
-            name = study.name if progress else None
             engines = [engine]
             if isinstance(engine, BatchEngine):
-                # It does not say why a component refuses.
-                engines.append(FmuEngine(space.prepared, means.loop, own))
-            _complete(kept, engines, space, means, name)
+                # For runs that it refuses, since it gives no reason.
+                engines.append(FmuEngine(space.prepared, means.loop, ready.own))
+            _complete(store, engines, space, ready.means, study.name if progress else None)
         result = StudyResult(folder)
-        kept.write_record(
+        store.write_record(
             {**read_study_record(folder), "failed": result.failed, "cautions": result.cautions}
         )
-        # All figures or, where one of them cannot be written, none.
-        with kept.ledger.changing() as unfinished:
-            legends = {name: scenario.legend for name, (scenario, _) in systems.items()}
-            notes = list(
-                draw_figures(
-                    entries,
-                    study.title,
-                    result,
-                    unfinished,
-                    legends,
-                    space.units,
-                    space.logarithmic,
-                )
-            )
+        # All figures, or none if one of them cannot be written.
+        with store.ledger.changing() as unfinished:
+            legends = {name: scenario.legend for name, (scenario, _) in ready.systems.items()}
+            runs = Values(result, legends=legends, units=space.units, logarithmic=space.logarithmic)
+            notes = list(draw_figures(ready.figures, study.title, runs, unfinished))
         for note in notes:
             say(note)
     return result
 
 
 class Ready(NamedTuple):
-    """A study whose runs can be made.
+    """A study that is ready to run.
 
     Attributes:
-        means: how, with the kind of FMUs that there is.
-        systems: that are run, by the names of their scenarios.
+        means: options, with the kind of FMUs.
+        systems: by the names of their scenarios.
         space: its runs.
-        figures: that are drawn of them.
-        engine: that makes them.
-        own: indices of the user's own.
+        figures: to draw.
+        engine: that makes the runs.
+        own: the user's own indices.
 
     """
 
@@ -224,10 +221,10 @@ class Ready(NamedTuple):
 
 
 def prepare_study(study: Study, means: Means) -> Ready:
-    """Find out whether the runs of a study can be made, and prepare them.
+    """Check a study and prepare its runs.
 
     Raises:
-        Refused: they cannot be made, or what is drawn of them; with all problems.
+        Refused: its runs cannot be made, or its figures cannot be drawn; with all problems.
 
     """
     findings, systems = Findings(), dict[str, tuple[Scenario, System]]()
@@ -238,7 +235,7 @@ def prepare_study(study: Study, means: Means) -> Ready:
     if any(scenario.digest for scenario, _ in systems.values()):
         means = replace(means, kind=_kind(settings_of(current_fmus(means.kind))["kind"]))
     own = own_indices(study, {name: system for name, (_, system) in systems.items()})
-    space = Space(study, systems, [*chain(*(one.indices for one in own))])
+    space = Space(study, systems, [*chain(*(file.indices for file in own))])
     with findings.collecting():
         figures = with_fields(study.figures, own, space.indices)
         entries = read_figures(
@@ -251,24 +248,19 @@ def prepare_study(study: Study, means: Means) -> Ready:
 
 
 def _kind_begun(folder: Path) -> KindName:
-    """The kind of FMU that the study in a folder was begun with; if there is none, any."""
+    """Return the kind of FMUs with which the study in a folder began, or AUTO without one."""
     with suppress(InputError):
         return _kind(read_study_record(folder).get("kind"))
     return AUTO
 
 
 def _kind(name: object) -> KindName:
-    """The kind of a name; of any other name, each kind will do."""
+    """Return the kind with a name, or AUTO if there is none."""
     return next((kind for kind in KINDS if kind == name), AUTO)
 
 
 def check_installed(needed: Sequence[str] = _NEEDED) -> None:
-    """Check that the packages are there that studies need.
-
-    Raises:
-        InputError: one of them is not.
-
-    """
+    """Raise an InputError if packages are not installed."""
     missing = [package for package in needed if find_spec(package) is None]
     if "distributed" in missing:
         raise InputError("--scheduler needs Dask: pip install 'auv-fmu[cluster]'")
@@ -277,20 +269,15 @@ def check_installed(needed: Sequence[str] = _NEEDED) -> None:
 
 
 def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
-    """Check that there is such an engine, and that it does all that is asked of it in a run.
-
-    Raises:
-        InputError: it does not.
-
-    """
+    """Raise an InputError if there is no such engine, or it does not support the runs."""
     if name not in ENGINES:
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
-    for scenario, one in prepared.items():
-        if one.input_table is not None:
+    for scenario, run in prepared.items():
+        if run.input_table is not None:
             raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
-        if name == BATCH and one.events:
+        if name == BATCH and run.events:
             raise InputError(f"{scenario}: has events, which engine {BATCH!r} does not support")
-        if name == BATCH and one.experiment.coupling == "linear":
+        if name == BATCH and run.experiment.coupling == "linear":
             raise InputError(
                 f"{scenario}: coupling linear goes back in time, which engine {BATCH!r} cannot; "
                 f"use --engine {FMU}"
@@ -304,21 +291,23 @@ def _engine(
     if name == FMU:
         return FmuEngine(prepared, means.loop, own)
     engine = BatchEngine(_systems(prepared), own)
-    for scenario, one in prepared.items():
-        plan = one.experiment
-        engine.prepare(Point(0, scenario, {}, plan.stop_time, plan.step, plan.order))
+    for scenario, run in prepared.items():
+        experiment = run.experiment
+        engine.prepare(
+            Point(0, scenario, {}, experiment.stop_time, experiment.step, experiment.order)
+        )
     return engine
 
 
 def _systems(prepared: Mapping[str, Prepared]) -> dict[str, System]:
-    return {scenario: one.system for scenario, one in prepared.items()}
+    return {scenario: run.system for scenario, run in prepared.items()}
 
 
 def faster(space: Space, engine: Engine, means: Means, own: Sequence[OwnIndex] = ()) -> str:
-    """What would make many runs sooner, with the same numbers, in words; empty: nothing."""
+    """Return a hint at an option that makes many runs faster; empty if there is none."""
     option = ""
     if len(space) >= _MANY and isinstance(engine, FmuEngine):
-        is_bundles = all(one.scenario.digest for one in space.prepared.values())
+        is_bundles = all(run.scenario.digest for run in space.prepared.values())
         if means.kind == PYTHON and is_bundles and machines_compiler():
             option = "--kind native"
         with suppress(InputError):
@@ -331,35 +320,28 @@ def faster(space: Space, engine: Engine, means: Means, own: Sequence[OwnIndex] =
     )
 
 
-def _record(
-    study: Study,
-    means: Means,
-    space: Space,
-    engine: Engine,
-    scenarios: Sequence[Scenario],
-    command: Sequence[str],
-    own: Sequence[OwnIndex],
-) -> dict[str, Any]:
-    """What study.json says when a study begins."""
+def _record(study: Study, ready: Ready, command: Sequence[str]) -> dict[str, Any]:
+    """Return the content of study.json at the start of a study."""
     stated = asdict(study)
+    own = {file.name: file.digest for file in ready.own}
     return {
         "study": study.name,
         "title": study.title,
         "command": list(command),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
-        "runs": len(space),
-        "kind": means.kind,
+        "runs": len(ready.space),
+        "kind": ready.means.kind,
         "made_of": {
-            "scenario": [scenario.name for scenario in scenarios],
-            "engine": means.engine or study.engine,
+            "scenario": [scenario.name for scenario, _ in ready.systems.values()],
+            "engine": ready.means.engine or study.engine,
             **{name: stated[name] for name in _STATED},
-            **({"indices": {one.name: one.digest for one in own}} if own else {}),
-            "points": space.digest,
-            "systems": [dict(prepared.identity) for prepared in space.prepared.values()],
-            "version": engine.digest,
+            **({"indices": own} if own else {}),
+            "points": ready.space.digest,
+            "systems": [dict(prepared.identity) for prepared in ready.space.prepared.values()],
+            "version": ready.engine.digest,
         },
         "versions": {"python": sys.version.split()[0]}
-        | {package: version(package) for package in _PACKAGES},
+        | {package: version(package) for package in _RECORDED},
         "platform": platform.platform(),
     }
 
@@ -372,66 +354,66 @@ def making_runs(
     scheduler: str | None = None,
     workers: int | None = None,
 ) -> Iterator[Iterator[list[Outcome]]]:
-    """The outcomes of runs, block by block as they are done, for the time of the context.
+    """Yield an iterator over the outcomes of runs, block by block as they are done.
 
-    Runs are taken from their iterator as they are needed. Each has one outcome, also a run that
-    ends the process which makes it: that comes at the very end.
+    Runs are taken from their iterator when they are needed. Each has one outcome; that of a run
+    that ends its process is the last.
 
     Args:
-        engine: what makes them.
-        points: to be made.
+        engine: that makes the runs.
+        points: runs to make.
         scheduler: address of a Dask scheduler; None for processes or threads of this machine.
-        workers: how many of them; None for one a core.
+        workers: number of them; None for one per core.
 
     Raises:
         InputError: there is no such scheduler, or no worker is left to make the runs.
 
     """
     if scheduler is not None:
-        # Dask takes a second to be imported, and need not be there.
+        # Dask takes a second to import, and need not be installed.
         from orchestrator.studies.cluster import cluster  # noqa: PLC0415
 
-        crew = cluster(scheduler, engine)
+        pool = cluster(scheduler, engine)
     elif isinstance(engine, BatchEngine):
-        crew = local_threads(workers, engine)
+        pool = local_threads(workers, engine)
     else:
-        crew = local_workers(workers, engine)
-    with crew as of:
-        yield Making(of).outcomes(points)
+        pool = local_workers(workers, engine)
+    with pool as started:
+        yield Blocks(started).outcomes(points)
 
 
 def _complete(
-    unfinished: Store, engines: Sequence[Engine], space: Space, means: Means, name: str | None
+    store: Store, engines: Sequence[Engine], space: Space, means: Means, name: str | None
 ) -> None:
-    """Make the runs that are missing, and the table of all.
+    """Make the missing runs and publish the table.
 
     Args:
-        unfinished: takes the runs.
-        engines: make them: each the ones that the one before it has refused.
-        space: all of them.
-        means: how they are made.
-        name: of the study, for a bar; None: there is no bar.
+        store: for the outcomes.
+        engines: each makes the runs that the one before has refused.
+        space: all runs.
+        means: options.
+        name: of the study, for a progress bar; None for no bar.
 
     """
     with progress_bar(
         total=len(space),
-        initial=len(unfinished),
+        initial=len(store),
         desc=name,
         unit="run",
         delay=_PATIENCE,
         disable=None if name else True,
     ) as bar:
-        left: Iterable[int] = unfinished.missing(len(space))
+        left: Iterable[int] = store.missing(len(space))
         for engine in engines:
             points, refused = (space[number] for number in left), list[int]()
-            made = making_runs(engine, points, scheduler=means.scheduler, workers=means.workers)
-            with made as blocks:
-                for outcomes in blocks:
-                    known = [one for one in outcomes if one.failure != REFUSED]
-                    refused += [one.number for one in outcomes if one.failure == REFUSED]
-                    unfinished.add(known)
-                    bar.update(len(known))
+            outcomes = making_runs(engine, points, scheduler=means.scheduler, workers=means.workers)
+            with outcomes as blocks:
+                for block in blocks:
+                    done = [outcome for outcome in block if outcome.failure != REFUSED]
+                    refused += [outcome.number for outcome in block if outcome.failure == REFUSED]
+                    store.add(done)
+                    bar.update(len(done))
             if not refused:
                 break
             left = sorted(refused)
-    unfinished.publish(space)
+    store.publish(space)

@@ -22,8 +22,7 @@ from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import ready_studies
-from orchestrator.studies.study_file import read_figures, study_of
+from orchestrator.studies.study import read_figures, ready_studies, study_of
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import true_control_point
 from support.machine import contents

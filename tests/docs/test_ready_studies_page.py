@@ -10,8 +10,7 @@ from PIL import Image
 
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import names
-from orchestrator.studies.study import ready_studies
-from orchestrator.studies.study_file import read_study
+from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
 from parts.gallery import PICTURES

@@ -28,8 +28,7 @@ from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.engine import FmuEngine, Point
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import ready_studies
-from orchestrator.studies.study_file import read_study
+from orchestrator.studies.study import read_study, ready_studies
 from support import largest_depth, others
 from support.runs import prepared, whole
 from support.texts import mentions

@@ -31,12 +31,11 @@ from orchestrator.cosim import (
     Value,
     write_ssp,
 )
-from orchestrator.figures.drawing import compose
-from orchestrator.figures.plot import plot
+from orchestrator.figures.drawing import compose, plot
 from orchestrator.figures.run_figures import FIGURES
 from orchestrator.runs.result import read_result
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.studies.study_result import StudyResult
+from orchestrator.studies.store import StudyResult
 from support import linear, relay, typed
 from support.live import needs_npm
 from support.pages import stored

@@ -20,8 +20,7 @@ from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import BATCH, FMU
-from orchestrator.studies.study_file import read_study, study_of
+from orchestrator.studies.study import BATCH, FMU, read_study, study_of
 from orchestrator.studies.sweep import Means, faster
 from orchestrator.vehicle.indices import index_columns
 from support import others

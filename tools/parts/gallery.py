@@ -9,8 +9,7 @@ from orchestrator.figures.run_figures import FLEET
 from orchestrator.figures.study_values import Values
 from orchestrator.machine.texts import flatten
 from orchestrator.runs.scenario import Scenario, names, read_scenario
-from orchestrator.studies.study import Study, ready_studies
-from orchestrator.studies.study_file import LABELS, FigureTable, read_study
+from orchestrator.studies.study import LABELS, FigureTable, Study, read_study, ready_studies
 
 #: The pictures of the scenarios and, below it, of the studies, in docs/.
 PICTURES = "images"

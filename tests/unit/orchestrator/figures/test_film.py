@@ -1,4 +1,4 @@
-"""A film shows what moves, in all its frames."""
+"""Films: frames, size, speed, vehicles."""
 
 from itertools import pairwise
 
@@ -29,7 +29,7 @@ def test_film_has_a_frame_for_each_instant(tmp_path):
     assert all((a != b).any() for a, b in pairwise(frames))
 
 
-def test_size_and_speed_are_as_wanted(tmp_path):
+def test_size_and_speed(tmp_path):
     """The run lasts 8 s, less a step: at twice its speed, 4 s with 2 frames a second."""
     path = tmp_path / "film.gif"
     animate("title", Drawn("run", loop_table()), path, Film(2, (400, 300), 2.0))
@@ -39,8 +39,7 @@ def test_size_and_speed_are_as_wanted(tmp_path):
 
 
 @pytest.mark.parametrize("z_up", [False, True])
-def test_body_is_upright_whichever_way_z_points(z_up):
-    """It is as long as it should be, and its upper fin is above the hull in the picture."""
+def test_body_has_its_length_and_its_upper_fin_above_the_hull(z_up):
     faces, part = _body(2.0, z_up)
     assert (faces[..., 0].min(), faces[..., 0].max()) == (-2.0, 0.0)
     up = 1.0 if z_up else -1.0

@@ -1,4 +1,4 @@
-"""Figures show the numbers of the table, leave out what is not there, and say so."""
+"""Figures show the numbers of the table and the events, and say which panels are missing."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from orchestrator.cosim import PortName, Table
-from orchestrator.figures.drawing import compose, draw, overlay
+from orchestrator.cosim import Ending, Occurrence, PortName, Table
+from orchestrator.figures.drawing import compose, draw, one_figure, save
 from orchestrator.figures.run_figures import FIGURES, check_figure
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
@@ -54,7 +54,7 @@ def test_lines_hold_the_numbers_of_the_table():
 
 
 @pytest.mark.parametrize("figure", FIGURES)
-def test_the_row_that_signals_stand_in_changes_no_line(figure):
+def test_lines_do_not_depend_on_the_order_of_evaluation(figure):
     table = loop_table(order="gauss-seidel")
     acting = (*STANDARD.commanded, *STANDARD.dy_hat, *STANDARD.theta_hat)
     for rows in FIGURES[figure].values():
@@ -85,27 +85,27 @@ def test_panels_end_together():
 
 
 @pytest.mark.parametrize(
-    ("without", "note"),
+    ("without", "name", "reason"),
     [
-        (STANDARD.theta_hat, "estimated parameters skipped: no controller.theta_hat[1]"),
-        (STANDARD.y_d, "tracking errors skipped: no planner.y_d.x"),
-        (STANDARD.commanded, "commands skipped: no plant.tau.u"),
+        (STANDARD.theta_hat, "estimated parameters", "the run has no controller.theta_hat[1]"),
+        (STANDARD.y_d, "tracking errors", "the run has no planner.y_d.x"),
+        (STANDARD.commanded, "commands", "the run has no plant.tau.u"),
     ],
 )
-def test_what_is_missing_is_left_out_with_a_note(without, note):
-    """As with a user's own controller, which need not estimate anything."""
+def test_a_panel_without_signals_is_left_out_with_a_note(without, name, reason):
+    """A user's own controller need not estimate anything."""
     _, notes = compose("", FIGURES["tracking"][""], [Drawn("run", loop_table(without=without))])
-    assert note in notes
+    assert f"panel {name!r} left out: {reason}" in notes
 
 
-def test_a_figure_that_is_missing_is_left_out_with_a_note(tmp_path):
+def test_a_figure_without_signals_is_left_out_with_a_note(tmp_path):
     notes = notes_of("tracking", loop_table(without=STANDARD.dy_hat), folder=tmp_path)
-    assert notes == ["f-velocity skipped: no controller.dy_hat.x"]
+    assert notes == ["figure f-velocity left out: the run has no controller.dy_hat.x"]
     assert {path.name for path in tmp_path.iterdir()} == {"f.png", "f.svg"}
 
 
 @pytest.mark.parametrize("kind", FIGURES)
-def test_no_vehicle_is_no_figure_and_one_note(tmp_path, kind):
+def test_a_run_without_a_vehicle_has_no_figure_and_one_note(tmp_path, kind):
     of_vehicle = (*STANDARD.posture, *STANDARD.nu, *STANDARD.commanded)
     without = (*of_vehicle, *STANDARD.theta_hat, *STANDARD.dy_hat)
     [note] = notes_of(kind, loop_table(without=without), folder=tmp_path)
@@ -113,7 +113,7 @@ def test_no_vehicle_is_no_figure_and_one_note(tmp_path, kind):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_run_without_a_step_is_no_figure(tmp_path):
+def test_a_run_without_a_step_has_no_figure(tmp_path):
     assert notes_of("tracking", loop_table(1), folder=tmp_path) == [
         "no figure: the run has no step"
     ]
@@ -122,14 +122,14 @@ def test_a_run_without_a_step_is_no_figure(tmp_path):
 def test_a_companion_that_lacks_something_is_named(tmp_path):
     companion = loop_table(without=STANDARD.y_d)
     notes = notes_of("comparison-errors", loop_table(), companion, folder=tmp_path)
-    assert "tracking errors of run 1 skipped: no planner.y_d.x" in notes
+    assert "panel 'tracking errors' left out for run 1, which has no planner.y_d.x" in notes
 
 
 def test_colours_belong_to_runs():
-    """A run that is not there does not hand its colour to the next."""
+    """A run without a signal does not pass its colour on."""
     tables = (loop_table(), loop_table(without=STANDARD.y_d), loop_table())
     runs = [Drawn(name, table) for name, table in zip("abc", tables, strict=True)]
-    figure = overlay("", runs)
+    figure = one_figure("overlay", "", runs)
     [names] = figure.legends
     assert [text.get_text() for text in names.texts] == ["a", "b", "c"]
     a, b, c = (line.get_color() for line in names.get_lines())
@@ -142,7 +142,7 @@ def test_colours_belong_to_runs():
 @pytest.mark.parametrize("kind", ["comparison", "overlay", "tracking"])
 @pytest.mark.parametrize("n", [2, 7])
 def test_long_names_leave_the_panels_their_room(kind, n):
-    """They stand above all panels, in sight, and nothing lies upon them."""
+    """The legend is above all panels, on the page, and nothing overlaps it."""
     names = [f"my controller with a notch filter, no. {i}" for i in range(n)]
     table = loop_table()
     table["plant.tau.u"][200] = -366.0
@@ -165,7 +165,7 @@ def test_long_names_leave_the_panels_their_room(kind, n):
 
 
 def test_a_figure_of_one_run_names_no_others():
-    """Its colours mean something else."""
+    """Its colours distinguish signals."""
     runs = [Drawn(name, loop_table()) for name in "ab"]
     figure, _ = compose("Fig. 4", FIGURES["tracking"]["-velocity"], runs)
     assert figure.legends == []
@@ -190,14 +190,14 @@ def test_a_figure_has_no_heading_where_none_is_given():
     assert without.get_figheight() < with_title.get_figheight()
 
 
-def test_nothing_is_drawn_when_it_is_to_stop(tmp_path):
+def test_nothing_is_drawn_after_stop(tmp_path):
     run = Drawn("run", loop_table())
     assert draw("tracking", "", [run], tmp_path, "f", stop=lambda: True) == []
     assert not list(tmp_path.iterdir())
 
 
 @pytest.mark.slow
-def test_same_run_is_the_same_file(tmp_path):
+def test_equal_runs_give_equal_files(tmp_path):
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
         notes_of("comparison", loop_table(), loop_table(seed=2), folder=tmp_path / name)
@@ -206,7 +206,7 @@ def test_same_run_is_the_same_file(tmp_path):
 
 
 @pytest.mark.parametrize("value", slow(np.nan, 2e8, 1e-9, np.inf))
-def test_matplotlib_keeps_its_thoughts_to_itself(tmp_path, caplog, value):
+def test_matplotlib_warns_of_nothing(tmp_path, caplog, value):
     table = loop_table()
     for column in (*STANDARD.commanded, *STANDARD.theta_hat, *STANDARD.dy_hat):
         table[column][200:] = value
@@ -224,7 +224,7 @@ def test_an_unknown_figure_is_refused_with_a_hint():
         check_figure("none")
 
 
-def test_waypoints_stand_in_the_path():
+def test_waypoints_are_in_the_path():
     table = loop_table()
     points = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])
     known = {PortName.read("planner.count"): 2} | {
@@ -236,5 +236,82 @@ def test_waypoints_stand_in_the_path():
     run = Drawn("run", Table.of(header, table.rows))
     figure, _ = compose("", FIGURES["tracking"][""], [run])
     [axes] = [axes for axes in figure.axes if axes.name == "3d"]
-    [marks] = [one for one in axes.collections if one.get_label() == "waypoints"]
+    [marks] = [marks for marks in axes.collections if marks.get_label() == "waypoints"]
     np.testing.assert_array_equal(np.column_stack(marks._offsets3d), points)
+
+
+# Events
+
+
+def with_events(*occurrences):
+    """A closed loop of 8 s with events."""
+    table = loop_table()
+    return Table.of(table.header, table.rows, Ending(events=tuple(occurrences)))
+
+
+def numbers_in(axes):
+    return [text for text in axes.texts if text.get_text().isdecimal()]
+
+
+def test_events_have_numbers_in_the_panels_and_their_names_below_the_figure():
+    table = with_events(
+        Occurrence(2.0, "drop plant.y", "no position", 0),
+        Occurrence(4.00000001, "drop plant.y, ended", event=0),
+        Occurrence(5.0, "stop", "power lost", 1),
+    )
+    figure, _ = compose("", FIGURES["comparison"][""], [Drawn("run", table)])
+    assert figure.get_supxlabel() == "1: no position, 2 to 4 s; 2: power lost, 5 s"
+    first = panel(figure, "$e_x$ [m]")
+    assert [text.get_text() for text in numbers_in(first)] == ["1", "2"]
+    assert not numbers_in(panel(figure, "$e_y$ [m]"))
+    marked = {line.get_xdata()[0] for line in panel(figure, "$e_y$ [m]").get_lines()[1:]}
+    assert marked == {2.0, 4.00000001, 5.0}
+
+
+def test_events_leave_the_axes_as_they_are():
+    table = with_events(Occurrence(2.0, "stop", "power lost", 1))
+    limits = [
+        panel(compose("", FIGURES["comparison"][""], [Drawn("run", one)])[0], "$e_x$ [m]")
+        for one in (table, loop_table())
+    ]
+    assert limits[0].get_ylim() == limits[1].get_ylim()
+
+
+def test_the_list_of_events_names_the_runs_if_times_differ():
+    early = with_events(Occurrence(2.0, "a", "fault"), Occurrence(3.0, "b", "gust"))
+    late = with_events(Occurrence(2.5, "a", "fault"), Occurrence(3.0, "b", "gust"))
+    runs = [Drawn("proposed", early), Drawn("PD", late), Drawn("third", early)]
+    figure, _ = compose("", FIGURES["comparison"][""], runs)
+    assert figure.get_supxlabel() == (
+        "1: fault, 2 s (proposed), 2.5 s (PD), 2 s (third); 2: gust, 3 s"
+    )
+
+
+def test_numbers_of_events_do_not_overlap():
+    table = with_events(*(Occurrence(4.0 + 0.01 * i, f"{i}", f"event {i}") for i in range(5)))
+    figure, _ = compose("", FIGURES["comparison"][""], [Drawn("run", table)])
+    save(figure, *())
+    boxes = [text.get_window_extent() for text in numbers_in(panel(figure, "$e_x$ [m]"))]
+    assert len(boxes) == 5
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
+
+
+def test_an_event_has_its_own_end_if_another_text_begins_alike():
+    """The first event does not end."""
+    events = [
+        Occurrence(1.0, "freeze a.u", "for ever", 0),
+        Occurrence(2.0, "freeze a.u, a.v", "both", 1),
+        Occurrence(3.0, "freeze a.u, a.v, ended", event=1),
+        Occurrence(3.5, "override a.u = 1", "one", 2),
+        Occurrence(4.0, "override a.u = 10", "ten", 3),
+        Occurrence(5.0, "override a.u = 10, ended", event=3),
+        Occurrence(6.0, "override a.u = 1, ended", event=2),
+        *(Occurrence(6.0 + 0.01 * i, "pulse", "pulse", 4) for i in range(20)),
+        Occurrence(7.0, "pulse, ended", event=4),
+    ]
+    figure, _ = compose("", FIGURES["comparison"][""], [Drawn("run", with_events(*events))])
+    said = figure.get_supxlabel().replace("\n", " ")
+    assert said.startswith(
+        "1: for ever, 1 s; 2: both, 2 to 3 s; 3: one, 3.5 to 6 s; 4: ten, 4 to 5 s; "
+        "5: pulse, 6 to 7 s"
+    )

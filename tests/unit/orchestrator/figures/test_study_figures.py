@@ -1,4 +1,4 @@
-"""Figures of studies show what loops over the runs find."""
+"""Figures of studies, compared with loops over the runs."""
 
 from __future__ import annotations
 
@@ -7,9 +7,18 @@ import pytest
 
 from orchestrator.figures import study_figures, study_values
 from orchestrator.figures.drawing import styled
-from orchestrator.figures.study_figures import bands, draw_figures, influence, maps, pareto_front
+from orchestrator.figures.study_figures import (
+    bands,
+    bins_of,
+    draw_figures,
+    grouped,
+    influence,
+    is_logarithmic,
+    maps,
+    pareto_front,
+)
 from orchestrator.figures.study_values import Values
-from orchestrator.studies.study_file import read_figures
+from orchestrator.studies.study import read_figures
 from orchestrator.vehicle.indices import index_columns
 from support.machine import contents
 
@@ -76,7 +85,7 @@ def test_maps_are_medians_and_grey_where_no_run_has_any():
 
 
 def explained(figure):
-    """What stands in the legend below the panels."""
+    """Texts of the legend below the panels."""
     return [text.get_text() for legend in figure.legends for text in legend.texts]
 
 
@@ -98,7 +107,7 @@ def test_limits_bands_and_grey_cells_are_explained():
     assert explained(maps(entry(**cells, show="peak_command.u"), "", runs)) == []
 
 
-def test_front_is_what_nothing_else_beats():
+def test_no_other_point_beats_one_of_the_front():
     points = np.random.default_rng(4).integers(0, 30, (200, 2)).astype(float)
     found = {tuple(point) for point in pareto_front(points)}
     expected = {
@@ -107,7 +116,7 @@ def test_front_is_what_nothing_else_beats():
     assert found == expected
 
 
-def test_influence_knows_more_less_and_nothing():
+def test_influence_is_a_rank_correlation():
     pytest.importorskip("scipy", reason="needs the extra `studies`")
     runs = columns()
     runs["final_error.x"] = -np.exp(runs["disturbance.A_d"] / 10)
@@ -140,7 +149,7 @@ def test_influence_of_few_or_long_names_can_be_read(n, show, by):
         assert name.get_window_extent().y0 >= 0.0
 
 
-def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_out(tmp_path):
+def test_equal_runs_give_equal_files_and_a_figure_without_values_is_left_out(tmp_path):
     figures = {
         "error": {"kind": "bands", "x": "disturbance.A_f", "show": "late_error"},
         "drift": {"kind": "front", "x": "largest_drift", "y": "late_error"},
@@ -150,9 +159,9 @@ def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_
     entries = read_figures("mine.toml", figures, VARIED, True)
     for folder in (tmp_path / "a", tmp_path / "b"):
         folder.mkdir()
-        assert list(draw_figures(entries, "A_f and A_d", columns(), folder)) == [
-            "figure drift skipped: no run has largest_drift",
-            "figure many skipped: by splits the runs into 25 parts, more than 12",
+        assert list(draw_figures(entries, "A_f and A_d", Values(columns()), folder)) == [
+            "figure drift left out: no run has largest_drift",
+            "figure many left out: by splits the runs into 25 parts, more than 12",
         ]
     found = contents(tmp_path / "a")
     assert found.keys() == {"error.png", "error.svg", "effort.png", "effort.svg"}
@@ -161,3 +170,57 @@ def test_figures_are_the_same_files_each_time_and_those_without_values_are_left_
 
 def test_each_chart_is_drawn():
     assert study_figures._DRAW.keys() == study_values.CHARTS.keys()
+
+
+# Bins
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        (np.geomspace(1.0, 20.0, 50), True),
+        (np.geomspace(1.0, 9.0, 50), False),
+        ([0.0, *np.geomspace(1.0, 20.0, 50)], False),
+        ([-1.0, 20.0], False),
+        ([1e-9, *np.linspace(5.0, 20.0, 50)], False),
+        ([1.0, np.nan, 100.0], True),
+        ([np.nan], False),
+    ],
+)
+def test_axis_is_logarithmic_where_a_linear_one_would_hide_most(values, expected):
+    assert is_logarithmic(np.array(values)) is expected
+
+
+@pytest.mark.parametrize("grid", [np.geomspace(0.5, 64.0, 7), np.linspace(-3.0, 5.0, 4), [2.0]])
+def test_each_value_of_a_grid_has_a_bin(grid):
+    bins = bins_of(np.repeat(grid, 3), 24)
+    np.testing.assert_allclose(bins.centres, grid, rtol=1e-12)
+    assert bins.places(np.array(grid)).tolist() == list(range(len(grid)))
+    assert all(np.diff(bins.edges) > 0.0)
+
+
+def test_a_narrow_axis_is_logarithmic_if_its_values_are_spaced_so():
+    narrow = np.random.default_rng(4).uniform(1.0, 3.0, 100)
+    assert bins_of(narrow, 10, is_wide=True).is_logarithmic
+    assert not bins_of(narrow, 10).is_logarithmic
+    assert bins_of(np.geomspace(1.0, 3.0, 5), 10).is_logarithmic
+    assert not bins_of(np.linspace(1.0, 3.0, 5), 10).is_logarithmic
+
+
+def test_bins_of_other_values_are_equally_wide_or_equally_full():
+    values = np.random.default_rng(1).lognormal(0.0, 2.0, 1000)
+    full = bins_of(values, 10, are_full=True)
+    assert full.is_logarithmic
+    assert np.bincount(full.places(values)).tolist() == [100] * 10
+    wide = bins_of(values, 10)
+    np.testing.assert_allclose(np.diff(np.log(wide.edges)), np.ptp(np.log(values)) / 10)
+
+
+def test_groups_are_the_finite_values_of_each_bin():
+    random = np.random.default_rng(2)
+    places, values = random.integers(0, 5, 40), random.normal(size=40)
+    values[::7] = np.nan
+    places[places == 3] = 4
+    for place, group in enumerate(grouped(places, values, 6)):
+        expected = [v for p, v in zip(places, values, strict=True) if p == place and np.isfinite(v)]
+        assert sorted(group) == sorted(expected)

@@ -1,4 +1,4 @@
-"""Headings: symbols are set, everything else is text. Colours: each vehicle has its own."""
+"""Symbols in headings are formulas; vehicles have different colours."""
 
 import re
 
@@ -20,12 +20,12 @@ from orchestrator.figures.style import REFERENCE, heading, vehicle_colours
         (r"a\A_f", r"a\A_f"),
     ],
 )
-def test_symbols_of_the_paper_are_set(title, expected):
+def test_symbols_of_the_paper_are_formulas(title, expected):
     assert heading(title) == expected
 
 
 @given(st.text(alphabet=r"aA_ftheta_hat$\{}^ 1=.", max_size=30))
-def test_no_title_is_a_broken_formula(title):
+def test_every_title_can_be_drawn(title):
     figure = Figure()
     figure.suptitle(heading(title))
     figure.draw_without_rendering()

@@ -17,7 +17,7 @@ WHOLE, DIVISIONS = 20_000, 200
 
 
 def seen_of(rows: np.ndarray, block: int, watched: Collection[str] = ("a", "b", "c")):
-    """What is kept of rows that come in blocks, of a run that should have gone on for long."""
+    """Rows of an interrupted long run, taken in blocks."""
     seen = VisibleRows(watched)
     seen.begin(Header(("a", "b", "c"), Experiment(1e6, 1.0)))
     for start in range(0, len(rows), block):
@@ -44,7 +44,7 @@ def random_rows(seed: int, n: int) -> np.ndarray:
     watched=st.sets(st.sampled_from("abc"), min_size=1),
 )
 def test_extremes_of_each_division_are_kept(seed, n, block, watched):
-    """A straight search over the whole table, against rows that came in blocks."""
+    """Compared with a search of the whole table."""
     rows = random_rows(seed, n)
     seen = seen_of(rows, block, watched)
     size = WHOLE // DIVISIONS
@@ -59,14 +59,14 @@ def test_extremes_of_each_division_are_kept(seed, n, block, watched):
     kept = set(seen.time)
     assert {0.0, n - 1.0} <= kept
     assert len(seen) <= 2 * DIVISIONS * 2 * (2 * len(watched) + 2) + 1
-    # Rows are those of the run, in order.
+    # All are rows of the run, in order.
     assert (np.diff(seen.time) > 0).all()
     np.testing.assert_array_equal(seen.rows, rows[seen.time.astype(int)])
 
 
 @pytest.mark.parametrize("n", [WHOLE + 1, 90_000])
 @pytest.mark.parametrize("block", [7, 4096])
-def test_blocks_in_which_rows_come_change_nothing(n, block):
+def test_rows_do_not_depend_on_the_size_of_blocks(n, block):
     rows = random_rows(2, n)
     one, other = seen_of(rows, 512), seen_of(rows, block)
     assert one.rows.tobytes() == other.rows.tobytes()
@@ -82,13 +82,13 @@ def test_short_runs_are_kept_whole(n):
 
 
 def test_an_interrupted_run_is_resolved_as_finely_as_a_complete_one():
-    """Of a run of a million steps 30,000 were made: hundreds of divisions, not ten."""
+    """30,000 steps of a million have hundreds of divisions, not ten."""
     seen = seen_of(random_rows(1, 30_000), 512)
     assert len(np.unique(seen.time // 150)) == 200
 
 
-def test_means_are_those_of_all_rows():
-    """Of spikes upwards, which are all extremes: the kept rows have quite another mean."""
+def test_means_are_taken_over_all_rows():
+    """Spikes upwards are all extremes, so that the kept rows have quite another mean."""
     n = 100_000
     rows = random_rows(3, n)
     rows[:, 1] = np.where(np.arange(n) % 10 == 0, 100.0, 0.0)
@@ -121,20 +121,20 @@ TIME = 0.02 * np.arange(5001)
         (1.0 / (1.0 + TIME) + 1e-9 * np.random.default_rng(1).normal(size=5001), False),
     ],
 )
-def test_chatter_is_what_turns_around_at_every_other_step(values, expected):
+def test_a_signal_chatters_if_it_turns_at_every_other_step(values, expected):
     assert chatters(values) is expected
 
 
 @given(st.floats(-5, 5), st.floats(-5, 5), st.floats(0.05, 20))
 def test_mean_of_a_straight_line_is_the_line(a, b, window):
-    """Where the window lies within the run."""
+    """Compared at rows whose window is within the run."""
     inside = np.abs(TIME - TIME[2500]) < 50.0 - window
     mean = moving_mean(TIME, a + b * TIME, window)
     np.testing.assert_allclose(mean[inside], (a + b * TIME)[inside], atol=1e-9)
 
 
 def test_mean_of_a_sine_is_smaller_by_the_known_factor():
-    """Over a window w: sin(pi f w) / (pi f w), also where rows are missing."""
+    """Over a window w: sin(pi f w) / (pi f w), even if rows are missing."""
     keep = np.sort(np.random.default_rng(2).choice(5001, 4000, replace=False))
     time, w, f = TIME[keep], 1.0, 0.2
     mean = moving_mean(time, np.sin(2 * np.pi * f * time), w)
@@ -143,7 +143,7 @@ def test_mean_of_a_sine_is_smaller_by_the_known_factor():
     np.testing.assert_allclose(mean[inside], expected[inside], atol=5e-3)
 
 
-def test_mean_that_is_drawn_of_a_long_run_is_that_of_all_its_rows():
+def test_the_drawn_mean_of_a_long_run_is_taken_over_all_its_rows():
     """Spikes upwards on a slow sine, 2000 s: a spike of 100 in every ten rows adds 10 to it."""
     n, w = 100_001, 20.0
     time = 0.02 * np.arange(n)

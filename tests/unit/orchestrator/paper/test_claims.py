@@ -1,4 +1,4 @@
-"""Claims judged by runs whose numbers are known by hand."""
+"""Claims compared with runs whose numbers are calculated by hand."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from orchestrator.paper.claims import (
     CLAIMS,
     Approach,
     Claim,
+    KeptRun,
     approach_of,
     errors,
     largest_error_after,
     total_variation_until,
     turning_radius,
 )
-from orchestrator.paper.kept_runs import KeptRun
 from orchestrator.vehicle.signals import STANDARD, tracking_error
 from support.tables import table_of
 from support.texts import numbers_in, tells
@@ -47,7 +47,7 @@ def test_errors_of_all_rows_are_the_tracking_error():
     np.testing.assert_allclose(errors(table), tracking_error(table), rtol=1e-13, atol=1e-15)
 
 
-def test_claims_have_titles_of_their_own():
+def test_titles_differ():
     assert len({claim.title for claim in CLAIMS}) == len(CLAIMS)
 
 
@@ -66,7 +66,7 @@ def test_turning_radius_of_the_paper_would_agree():
     assert verdict.startswith("agrees") and tells(verdict, [1.0])
 
 
-def test_efforts_are_given_in_parts_of_the_published_ones():
+def test_efforts_are_divided_by_the_published_ones():
     found = claims.effort_proposed(kept_run(l2_effort=(260.0, 20.0, 53.0)))
     assert numbers_in(found.verdict) == [2, 0.5, 1]
     assert numbers_in(found.ours) == [260, 20, 53]
@@ -90,7 +90,7 @@ def test_efforts_as_a_sum_are_norms_by_the_root_of_h_and_the_time():
     assert numbers_in(found.verdict)[:6] == [1, 0.5, 1] * 2
 
 
-def test_final_errors_are_given_in_parts_of_the_published_ones():
+def test_final_errors_are_divided_by_the_published_ones():
     error = (0.02, 0.02, 0.03)
     ours = kept_run(final_error=error)
     assert numbers_in(claims.final_error_proposed(ours).verdict) == [2, 1, 0.5]
@@ -130,7 +130,7 @@ def test_final_errors_are_given_in_parts_of_the_published_ones():
             [kept_run(total_variation=TWOS), kept_run(total_variation=(3.0, 3.0, 1.0))],
         ),
         (
-            # By medians: one draw out of five says nothing.
+            # Medians: one draw of five changes nothing.
             claims.pd_chatters_with_noise,
             [kept_run(total_variation=ONES)] * 4
             + [kept_run(total_variation=THREES)]
@@ -173,7 +173,7 @@ def test_verdict_follows_from_the_numbers(judge, true, false):
     assert claim_of(judge).finding(false).verdict.startswith("**differs**")
 
 
-def test_more_accurate_is_said_in_times():
+def test_accuracy_is_a_ratio():
     found = claims.pd_is_accurate(
         kept_run(final_error=(2.0, 3.0, 4.0)), kept_run(final_error=(1.0, 0.5, 0.1))
     )
@@ -193,7 +193,7 @@ def test_total_variation_counts_the_steps_until_a_time():
     assert total_variation_until(table, 3.0).tolist() == [3.0 + 1.0] * 3
 
 
-def test_of_draws_the_largest_peak_of_each_figure_counts():
+def test_the_largest_peak_of_all_draws_counts():
     runs = [
         kept_run(peak_command=(i, 20.0 - i, 5.0), saturated_fraction=(0.0, i * 1e-4, 0.0))
         for i in range(10)
@@ -202,7 +202,7 @@ def test_of_draws_the_largest_peak_of_each_figure_counts():
     assert tells(found.ours, (5, 4, 20, 5, 9, 15, 5, 0.09))
 
 
-def test_severe_chattering_is_held_against_the_first_minute():
+def test_severe_chattering_is_compared_in_the_first_minute():
     smooth, rough = applied([1.0, 2.0, 0.0]), applied([1.0, 5.0, 0.0])
     found = claims.pd_chatters_severely(kept_run(smooth), kept_run(rough))
     assert found.verdict.startswith("agrees") and numbers_in(found.verdict) == [4, 4, 4]
@@ -219,8 +219,8 @@ def still(offsets):
     return table_of(time, {PortName("plant", "ell"): ELL}, **posture, **reference)
 
 
-def test_largest_error_forgets_the_start():
-    """The control point lies ell ahead of the vehicle, so the error is the offset alone."""
+def test_largest_error_ignores_the_start():
+    """The control point lies ell ahead of the vehicle, so the error is the offset."""
     table = still(np.array([9.0, 8.0, 7.0, 0.5, -0.75]))
     assert largest_error_after(table, 40.0) == pytest.approx(0.75)
     assert largest_error_after(table, 100.0) == 0.0
@@ -230,7 +230,7 @@ def test_largest_error_forgets_the_start():
 
 
 def arriving(force, steps=10):
-    """A vehicle that pushes all the while until the reference is 0.5 m away, 20 s a step."""
+    """A vehicle that pushes until the reference is 0.5 m away, in steps of 20 s."""
     offsets = np.array([30.0] * steps + [0.5])
     table = still(offsets)
     columns = {name.replace(".", "__"): table[name] for name in table.columns}
@@ -246,7 +246,7 @@ def test_no_force_has_less_effort_than_its_impulse_takes(force):
     assert found.duration == 200.0
     effort = np.sqrt(20.0 * np.sum(force[:-1] ** 2))
     assert found.least_effort <= effort * (1.0 + 1e-12) + 1e-12
-    # Without the step the same force is contradicted by nothing that comes later.
+    # Without the step, the same force is not contradicted later.
     coded = np.sqrt(np.sum(force[:-1] ** 2) / found.duration)
     assume(coded > 1e-9)
     assert found.contradicts_until(coded, 20.0) <= found.duration * (1.0 + 1e-9)
@@ -261,7 +261,7 @@ def test_a_constant_force_has_the_least_effort():
 
 
 @given(st.lists(st.floats(0.0, 80.0), min_size=50, max_size=200))
-def test_a_way_against_damping_takes_an_impulse_of_its_own(forces):
+def test_damping_needs_an_impulse(forces):
     """Straight on from rest, by (2): d11 times the way, and what the speed at its end takes.
 
     31 m against 30 kg/s are 930 N.s, which an effort of 130 N.s^0.5 gives in 51 s at the soonest.
@@ -277,7 +277,7 @@ def test_a_way_against_damping_takes_an_impulse_of_its_own(forces):
     assert Approach(0.0, vehicle.d11 * 31.0).soonest(130.0) == pytest.approx(51.0, abs=0.5)
 
 
-def test_efforts_are_held_against_the_impulse_of_the_way():
+def test_efforts_are_compared_with_the_impulse_of_the_approach():
     """1,000 N.s in 200 s: 71 N.s^0.5, which 130 and 235 exceed; 4,000 N.s take 283."""
     enough, short = kept_run(arriving(5.0)), kept_run(arriving(20.0))
     assert claims.effort_of_the_way(enough, enough).verdict.startswith("agrees")
@@ -305,7 +305,7 @@ def test_estimates_are_bounded():
 
 
 def test_more_effort_means_effort_gain_and_chattering():
-    """Of each actuator: no sum of newtons and newton metres hides one that falls."""
+    """For each actuator: a sum of newtons and newton metres could hide one that falls."""
     runs = [
         estimating(i, l2_effort=np.multiply(i, (3.0, 4.0, 12.0)), total_variation=(i, i, i))
         for i in (1.0, 2.0, 3.0)
@@ -321,7 +321,7 @@ def test_more_effort_means_effort_gain_and_chattering():
         assert claims.more_effort(*runs[:2], less).verdict == "**differs**"
 
 
-def test_intolerable_chattering_is_not_said_to_be_seen_where_it_is_not():
+def test_intolerable_chattering_is_saturation():
     quiet = kept_run(peak_command=(61.0, 22.9, 22.8), saturated_fraction=(0.0, 0.0, 0.0))
     assert claims.intolerable_chattering(quiet).verdict.startswith("**not seen**")
     rough = kept_run(peak_command=(610.0, 22.9, 22.8), saturated_fraction=(0.5, 0.0, 0.0))

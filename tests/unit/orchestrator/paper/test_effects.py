@@ -7,25 +7,25 @@ import pytest
 
 from orchestrator.cosim import Table
 from orchestrator.paper import effects
+from orchestrator.paper.claims import KeptRun
 from orchestrator.paper.effects import EFFECTS, LAMBDAS, NOISE_LEVELS, STEPS, show_effect
-from orchestrator.paper.kept_runs import KeptRun, KeptRuns
+from orchestrator.paper.report import make_runs
 from support.runs import InThisProcess
 from support.texts import tells
 
 
 @pytest.fixture(scope="module")
 def tables() -> dict[str, list[Table]]:
-    """Of some steps of the runs of each effect."""
-    runs = [run for effect in EFFECTS for run in effect.runs]
-    kept_runs = KeptRuns(runs, InThisProcess(), stop_time=0.2)
-    return {effect.name: [kept_runs[run].table for run in effect.runs] for effect in EFFECTS}
+    """The first steps of the runs of each effect."""
+    runs = make_runs([run for effect in EFFECTS for run in effect.runs], InThisProcess(), 0.2)
+    return {effect.name: [runs[run].table for run in effect.runs] for effect in EFFECTS}
 
 
 def made(tables, *metrics):
     return [KeptRun(values, table) for values, table in zip(metrics, tables, strict=True)]
 
 
-def test_names_are_apart():
+def test_names_differ():
     assert len({effect.name for effect in EFFECTS}) == len(EFFECTS)
 
 
@@ -61,7 +61,7 @@ def test_names_are_apart():
         ),
     ],
 )
-def test_the_text_tells_the_numbers(tables, name, metrics, told):
+def test_the_text_has_the_numbers(tables, name, metrics, told):
     [effect] = [effect for effect in EFFECTS if effect.name == name]
     assert tells(effect.show(*made(tables[name], *metrics))[0], *told)
 
@@ -113,7 +113,7 @@ def test_condition_30(tables):
 def test_certificates(tables):
     [table] = tables["certificates"]
     figure = effects.certificates_along_a_run(KeptRun({}, table))[1]
-    # An instant a step: at t = 0 the command is away from its limit by 80 less what it is.
+    # A value for each step: at t = 0 the margin is 80 minus the command.
     u, *_ = figure.axes[2].lines
     assert len(u.get_xdata()) == len(table) - 1
     assert u.get_ydata()[0] == pytest.approx(80.0 - abs(table.step_values("plant.tau.u")[0, 0]))

@@ -1,4 +1,4 @@
-"""Runs made by processes of this machine, of which some are lost."""
+"""Runs made by processes of this machine, some of which die."""
 
 from __future__ import annotations
 

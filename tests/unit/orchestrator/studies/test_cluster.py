@@ -1,4 +1,4 @@
-"""Runs made by real schedulers and their workers, of which some are lost."""
+"""Runs made by real schedulers and their workers, some of which die."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from orchestrator.studies.sweep import making_runs
 
 TESTS = Path(__file__).parents[3]
 
-#: Less than the minute for which a client waits that could not connect [s].
+#: Less than the minute that a client waits that could not connect [s].
 PATIENCE = 45.0
 
 
 def gives_up_after(seconds):
-    """Who looks for a scheduler."""
+    """Timeout of connections to a scheduler [s]."""
     return config.set({"distributed.comm.timeouts.connect": seconds})
 
 
 @contextmanager
 def started(*arguments):
-    """A process of Dask's, as on another machine: with nothing of this one's but the packages."""
+    """A process of Dask with only the packages of this process, as on another machine."""
     process = subprocess.Popen(
         [sys.executable, "-m", "dask", *arguments],
         stdout=subprocess.DEVNULL,
@@ -84,7 +84,7 @@ def test_a_scheduler_s_workers_come_and_go_while_a_study_is_under_way(scheduler,
 
 
 @pytest.mark.slow
-def test_a_scheduler_that_goes_is_said(scheduler, tmp_path):
+def test_a_scheduler_that_ends_is_reported(scheduler, tmp_path):
     address, process = scheduler
     with (
         gives_up_after(5.0),
@@ -98,7 +98,7 @@ def test_a_scheduler_that_goes_is_said(scheduler, tmp_path):
 
 
 @pytest.mark.parametrize("scheduler", ["tcp://127.0.0.1:1", "nowhere"])
-def test_who_cannot_make_runs_is_said_in_a_line(scheduler):
+def test_no_scheduler_is_one_line(scheduler):
     with (
         gives_up_after(0.5),
         pytest.raises(InputError, match=f"^no scheduler answers at {re.escape(scheduler)}"),
@@ -108,8 +108,8 @@ def test_who_cannot_make_runs_is_said_in_a_line(scheduler):
 
 
 @pytest.mark.slow
-def test_no_address_leaves_anything_to_wait_for():
-    """Whoever waits is patient here: it is said before anybody is asked, and the process ends."""
+def test_a_wrong_address_is_refused_at_once():
+    """With the usual timeout: each address is refused at once, and the process ends."""
     addresses = [
         "", "localhost", "tcp://", "tcp://:1", "tcp://a b:1", "tcp://a/b:1", "tcp://[::1",
         "tcp://127.0.0.1:x", "tcp://127.0.0.1:0", "tcp://127.0.0.1:99999", "foo://a:1", "a://b://c",
@@ -130,11 +130,13 @@ def test_no_address_leaves_anything_to_wait_for():
         timeout=PATIENCE, check=True,
     )  # fmt: skip
     beginnings = [line.split(": ")[0] for line in process.stdout.splitlines()]
-    assert beginnings == [f"no scheduler answers at {one or repr(one)}" for one in addresses]
+    assert beginnings == [
+        f"no scheduler answers at {address or repr(address)}" for address in addresses
+    ]
     assert process.stderr == ""
 
 
-def test_who_answers_and_says_nothing_is_no_scheduler():
+def test_a_server_that_never_answers_is_refused():
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
         with (

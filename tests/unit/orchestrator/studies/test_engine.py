@@ -24,7 +24,7 @@ def engine():
 
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 @pytest.mark.parametrize("scenario", ["fig5", "fig5-pd"])
-def test_outcome_is_that_of_the_same_run_alone(engine, scenario, order):
+def test_an_outcome_equals_the_run_by_simulate(engine, scenario, order):
     [outcome] = engine.outcomes([Point(3, scenario, CHANGES, 6.0, 0.015, order)])
     alone = simulate(
         scenario, CHANGES, stop_time=6.0, step=0.015, order=order, kind="native", loop="python"
@@ -73,12 +73,12 @@ def test_fmus_travel_with_the_engine(tmp_path, native):
     [outcome] = arrived.outcomes(runs)
     assert outcome.failure is None
     assert [outcome] == list(FmuEngine({"own": prepared("fig4")}).outcomes(runs))
-    # And on from there: what has come by post can be posted.
+    # An engine that was unpickled can be pickled.
     assert list(pickle.loads(pickle.dumps(arrived)).outcomes(runs)) == [outcome]
     assert arrived.digest == pickle.loads(sent).digest
 
 
-def test_interrupt_is_no_failure_of_a_run(engine):
+def test_an_interrupt_is_not_a_failure(engine):
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):

@@ -1,4 +1,4 @@
-"""Indices of the user's own, from files beside a study."""
+"""The user's own indices, in files next to a study."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from orchestrator.figures.study_values import Values
 from orchestrator.machine.errors import InputError, Refused
 from orchestrator.studies.engine import Point
 from orchestrator.studies.own_indices import OwnIndex, read_own_index, with_fields
-from orchestrator.studies.study_file import read_study
+from orchestrator.studies.study import read_study
 from orchestrator.studies.sweep import Means, prepare_study
 
 #: The last time at which the depth is further than this from its reference [m].
@@ -92,7 +92,7 @@ def test_an_index_beside_a_study_is_a_column_of_its_runs(tmp_path):
         run = simulate("fig4", {"plant.eta0.z": z}, stop_time=10.0, kind="native")
         away = np.abs(run["plant.eta.z"] - run["planner.y_d.z"]) > NEAR
         times.append(run.time[away].max(initial=-1.0))
-        # What never happens is not there.
+        # Without an event there is no time.
         assert np.nan_to_num(found, nan=-1.0) == times[-1]
     assert min(times) == -1.0 and max(times) > 1.0
     assert (tmp_path / "out" / "settle.png").is_file()
@@ -117,7 +117,7 @@ def test_a_file_may_hold_several(tmp_path):
     assert outcome.indices["away.b"] == 1.0
 
 
-def test_it_travels_with_the_engine(tmp_path):
+def test_it_is_pickled_with_the_engine(tmp_path):
     file, index = study(tmp_path)
     engine = prepare_study(read_study(str(file)), Means(kind="native")).engine
     runs = [Point(0, "fig4", {"plant.eta0.z": 3.0}, 1.0, 0.02)]
@@ -128,7 +128,7 @@ def test_it_travels_with_the_engine(tmp_path):
     assert here.indices["settling"] == 1.0
 
 
-def test_each_vehicle_has_its_own(tmp_path):
+def test_each_vehicle_has_its_index(tmp_path):
     file, _ = study(
         tmp_path, scenario="formation-v", varies="auv1.plant.m11", values=[200.0], stop_time=1.0
     )
@@ -139,7 +139,7 @@ def test_each_vehicle_has_its_own(tmp_path):
     assert {name for name in outcome.indices if "settling" in name} <= {*ready.figures[0].show}
 
 
-def test_what_it_raises_is_why_a_run_failed(tmp_path):
+def test_an_exception_of_an_index_is_the_failure_of_a_run(tmp_path):
     file, _ = study(tmp_path, SETTLING.replace("return State(t)", "return State(1.0 / (t - t))"))
     engine = prepare_study(read_study(str(file)), Means(kind="native")).engine
     [outcome] = engine.outcomes([Point(0, "fig4", {"plant.eta0.z": 3.0}, 1.0, 0.02)])
@@ -161,7 +161,7 @@ def test_what_it_raises_is_why_a_run_failed(tmp_path):
         ("from math import nan", "from math import nan\nimport beside", "No module named 'beside'"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told_before_the_first_run(tmp_path, before, after, told):
+def test_a_mistake_is_reported_before_the_first_run(tmp_path, before, after, told):
     assert before in SETTLING
     file, _ = study(tmp_path, SETTLING.replace(before, after))
     with pytest.raises(Refused) as raised:
@@ -178,14 +178,14 @@ def test_an_index_is_one_file(tmp_path):
         read_own_index(index)
 
 
-def test_without_a_file_the_name_is_no_number(tmp_path):
+def test_a_name_without_a_file_is_refused(tmp_path):
     file, index = study(tmp_path)
     index.unlink()
     with pytest.raises(Refused, match=r"no number 'settling', and there is no settling\.py"):
         prepare_study(read_study(str(file)), Means(kind="native"))
 
 
-def test_figures_without_indices_of_ones_own_stay_as_they_are():
+def test_figures_without_own_indices_are_not_changed():
     own = OwnIndex("other", SETTLING.encode())
     figures = {"f": {"kind": "front", "x": "a", "y": "b"}, "labels": {"a": "A"}}
     assert with_fields(figures, [own], ["settling"]) == figures

@@ -16,8 +16,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.studies.engine import Point
 from orchestrator.studies.space import Space
-from orchestrator.studies.study import MOST_RUNS
-from orchestrator.studies.study_file import study_of
+from orchestrator.studies.study import MOST_RUNS, study_of
 
 qmc = pytest.importorskip("scipy.stats.qmc", reason="needs the extra `studies`")
 
@@ -75,7 +74,7 @@ def formation() -> Any:
     own=st.dictionaries(st.sampled_from(["auv1", "auv2", "auv3"]), st.floats(2.0, 3.0)),
     is_first=st.booleans(),
 )
-def test_parameters_of_a_study_are_those_of_a_scenario(star, own, is_first):
+def test_parameters_have_the_syntax_of_scenarios(star, own, is_first):
     """A name with a star, and values that differ from vehicle to vehicle; others win."""
     named = {f"{vehicle}.plant.noise.std": value for vehicle, value in own.items()}
     stars = {"auv*.plant.noise.std": star}
@@ -92,7 +91,7 @@ def test_parameters_of_a_study_are_those_of_a_scenario(star, own, is_first):
 
 
 def test_values_of_components_in_systems_vary():
-    """Units are those of their variables."""
+    """They have the units of their variables."""
     scenario, system = load_scenario("fig5")
     nested = system.renamed({name: f"auv1.{name}" for name in system.components})
     content = {
@@ -106,7 +105,7 @@ def test_values_of_components_in_systems_vary():
     assert runs.units["auv1.plant.ell"] == "m"
 
 
-def test_each_point_is_run_with_each_scenario_that_has_what_it_has():
+def test_each_scenario_gets_the_parameters_that_it_has():
     runs = space(
         scenario=["fig5", "fig5-pd"],
         parameters={"controller.k_d": 40.0},
@@ -126,7 +125,7 @@ def test_each_point_is_run_with_each_scenario_that_has_what_it_has():
 
 
 @pytest.mark.parametrize("method", ["sobol", "latin-hypercube", "random"])
-def test_samples_are_those_of_the_seed_and_lie_in_their_ranges(method):
+def test_samples_follow_from_the_seed_and_the_ranges(method):
     ranges = {
         "plant.eta0.y": [-2.0, 6.0],
         "controller.k_d": {"from": 1, "to": 100, "spacing": "log"},
@@ -189,7 +188,7 @@ def test_whole_numbers_have_the_same_chance(ends):
     assert {type(number) for number in found} == {int}
 
 
-def test_stop_time_grows_with_what_varies_and_the_step_varies():
+def test_stop_time_and_step_vary():
     runs = space(
         stop_time={"base": 10.0, "per": {"plant.eta0.y": 2.0, "plant.eta0.z": -1.0}},
         vary={"plant.eta0.y": [0.0, 3.0], "plant.eta0.z": [-1.0, 5.0], "step": [0.01, 1]},
@@ -201,7 +200,7 @@ def test_stop_time_grows_with_what_varies_and_the_step_varies():
     assert "step" not in runs[0].parameters
 
 
-def test_points_are_told_apart_by_the_digest():
+def test_other_points_have_another_digest():
     one, same, other = (
         space(vary={"plant.eta0.y": values}) for values in ([1.0, 2.0], [1, 2], [1.0, 3.0])
     )
@@ -252,6 +251,6 @@ def test_points_are_told_apart_by_the_digest():
         ),
     ],
 )
-def test_what_no_run_could_have_is_refused_before_any_run(content, words):
+def test_impossible_values_are_refused_before_any_run(content, words):
     with pytest.raises(InputError, match=words):
         space(**content)

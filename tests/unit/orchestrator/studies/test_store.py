@@ -1,4 +1,4 @@
-"""Outcomes of a study, kept as they come."""
+"""Outcomes of a study in its folder."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ import pytest
 
 from orchestrator.machine.errors import InputError
 from orchestrator.studies.engine import Outcome
-from orchestrator.studies.store import open_store
-from orchestrator.studies.study_result import StudyResult, read_study_record
+from orchestrator.studies.store import StudyResult, open_store, read_study_record
 from orchestrator.vehicle.indices import index_columns
 from support.machine import contents, eventually
 
@@ -49,7 +48,7 @@ def check_refused(words: str, folder: Path, record: Mapping[str, Any] = RECORD):
         raise AssertionError
 
 
-def test_what_is_kept_is_found_again_and_the_rest_is_missing(tmp_path):
+def test_outcomes_are_kept_and_the_others_are_missing(tmp_path):
     with open_store(tmp_path / "new", RECORD, index_columns()) as first:
         assert list(first.missing(6)) == [0, 1, 2, 3, 4, 5]
         first.add([outcome(4), outcome(1)])
@@ -58,7 +57,7 @@ def test_what_is_kept_is_found_again_and_the_rest_is_missing(tmp_path):
         assert list(second.missing(6)) == [0, 2, 3, 5]
         missing = second.missing(6)
         next(missing)
-        # What comes while they are asked for changes nothing.
+        # New outcomes do not change an iteration.
         second.add([outcome(2), outcome(4)])
         assert list(missing) == [2, 3, 5]
         assert len(second) == 3
@@ -114,35 +113,33 @@ def test_study_that_is_done_is_not_opened_again(tmp_path):
     with open_store(tmp_path, RECORD | {"runs": 1}, index_columns()) as unfinished:
         unfinished.add([outcome(0)])
         unfinished.publish(Toys(1))
-    # As if it had been killed before its database was gone.
     with open_store(tmp_path, RECORD, index_columns()) as unfinished:
         assert unfinished.is_done
     assert not (tmp_path / "unfinished.sqlite").exists()
 
 
-def test_other_study_is_refused(tmp_path):
-    with open_store(tmp_path, RECORD, index_columns()):
-        pass
-    other = {"made_of": {"points": "5678", "scenario": ["fig4"], "step": 0.01}}
-    check_refused("another study, which differs in points, step; choose", tmp_path, other)
-    assert read_study_record(tmp_path) == json.loads(json.dumps(RECORD))
+def systems(*identities):
+    return {"made_of": {"systems": [*identities]}}
 
 
 @pytest.mark.parametrize(
     ("before", "now", "words"),
     [
-        ([{"the code": "1", "step": "2"}], [{"the code": "1", "step": "3"}], "step"),
-        ([{"step": "1"}, {"step": "1"}], [{"step": "2"}, {"order": "3"}], "step, order"),
-        ([{"step": "1"}], [{"step": "1"}, {"step": "1"}], "systems"),
-        # What an earlier version has kept.
-        ("1234", [{"step": "1"}], "systems"),
+        (RECORD, {"made_of": {"points": "5678", "scenario": ["fig4"], "step": 0.01}},
+         "points, step"),
+        (systems({"the code": "1", "step": "2"}), systems({"the code": "1", "step": "3"}), "step"),
+        (systems({"step": "1"}, {"step": "1"}), systems({"step": "2"}, {"order": "3"}),
+         "step, order"),
+        (systems({"step": "1"}), systems({"step": "1"}, {"step": "1"}), "systems"),
+        # The record of an earlier version.
+        ({"made_of": {"systems": "1234"}}, systems({"step": "1"}), "systems"),
     ],
-)
-def test_what_makes_systems_others_is_named(tmp_path, before, now, words):
-    with open_store(tmp_path, {"made_of": {"systems": before}}, index_columns()):
+)  # fmt: skip
+def test_another_study_is_refused_with_the_differences(tmp_path, before, now, words):
+    with open_store(tmp_path, before, index_columns()):
         pass
-    record = {"made_of": {"systems": now}}
-    check_refused(f"another study, which differs in {words}; choose", tmp_path, record)
+    check_refused(f"another study, which differs in {words}; choose", tmp_path, now)
+    assert read_study_record(tmp_path) == json.loads(json.dumps(before))
 
 
 def test_folder_is_for_one_process(tmp_path):
@@ -160,13 +157,13 @@ def test_folder_is_for_one_process(tmp_path):
         ("unfinished.sqlite-wal", "mine"),
     ],
 )
-def test_what_is_not_ours_is_refused(tmp_path, file, content):
+def test_files_of_the_user_are_refused(tmp_path, file, content):
     (tmp_path / file).write_text(content)
     check_refused("is not a file that auv-fmu wrote", tmp_path)
     assert (tmp_path / file).read_text() == content
 
 
-def test_damaged_database_and_place_that_is_no_folder_are_one_line(tmp_path):
+def test_a_damaged_database_and_a_file_as_folder_are_one_line(tmp_path):
     with open_store(tmp_path / "study", RECORD, index_columns()):
         pass
     (tmp_path / "study" / "unfinished.sqlite").write_bytes(b"no database" * 1000)

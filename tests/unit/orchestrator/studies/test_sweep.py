@@ -1,4 +1,4 @@
-"""A study as a whole, where something is missing."""
+"""A study as a whole, if something is missing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from orchestrator.studies import sweep as module
 STUDY = {"scenario": "fig4", "vary": {"plant.ell": [0.3, 0.4]}}
 
 
-def test_packages_that_are_missing_are_named_with_what_installs_them(monkeypatch, tmp_path):
+def test_missing_packages_are_named_with_a_command_to_install_them(monkeypatch, tmp_path):
     monkeypatch.setattr(
         module, "find_spec", lambda name: None if name in ("scipy", "pyarrow") else 1
     )
@@ -21,7 +21,7 @@ def test_packages_that_are_missing_are_named_with_what_installs_them(monkeypatch
     assert not (tmp_path / "study").exists()
 
 
-def test_engine_that_there_is_not_is_refused(monkeypatch, tmp_path):
+def test_an_unknown_engine_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(module, "find_spec", lambda name: 1)
     with pytest.raises(InputError, match="engine 'gpu': use one of fmu, batch"):
         sweep(STUDY, engine="gpu", out=tmp_path / "study")

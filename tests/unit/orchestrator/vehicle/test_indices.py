@@ -26,9 +26,8 @@ from orchestrator.figures.study_values import Values
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.studies.engine import FmuEngine
 from orchestrator.studies.space import Space
-from orchestrator.studies.store import open_store
-from orchestrator.studies.study_file import study_of
-from orchestrator.studies.study_result import StudyResult
+from orchestrator.studies.store import StudyResult, open_store
+from orchestrator.studies.study import study_of
 from orchestrator.vehicle import index
 from orchestrator.vehicle import indices as table_of_indices
 from orchestrator.vehicle.indices import Index, Indices, index_columns, metrics_of

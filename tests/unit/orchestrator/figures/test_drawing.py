@@ -1,4 +1,4 @@
-"""Any signals: which are chosen, which share a panel, and what they are called."""
+"""Plots of any signals: the columns drawn, their panels and labels."""
 
 from dataclasses import replace
 
@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim import Ending, Occurrence, PortName, Table
-from orchestrator.figures.drawing import save
-from orchestrator.figures.plot import plot, told_apart
+from orchestrator.figures.drawing import plot, save, told_apart
 from orchestrator.figures.style import Drawn
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import Loop
@@ -17,7 +16,7 @@ TIME = 0.02 * np.arange(10)
 
 
 def drawn(figure):
-    """Lines by the label of their panel and their own."""
+    """Lines by the labels of their panels and their own."""
     return {
         (axes.get_ylabel(), line.get_label()): np.array(line.get_data())
         for axes in figure.axes
@@ -36,7 +35,7 @@ def test_members_of_a_group_with_one_unit_share_a_panel():
         np.testing.assert_array_equal(line, (table.time, table[f"plant.eta.{member}"]))
 
 
-def test_runs_lie_over_each_other_with_labels_of_their_own():
+def test_runs_share_a_panel_with_a_label_each():
     first, second = loop_table(), loop_table(seed=2)
     lines = drawn(plot([Drawn("first", first), Drawn("second", second)], ["plant.eta.x"]))
     for label, table in (("first", first), ("second", second)):
@@ -45,7 +44,7 @@ def test_runs_lie_over_each_other_with_labels_of_their_own():
 
 @pytest.mark.parametrize("n", [2, 3, 7])
 def test_legends_of_many_runs_leave_the_panels_their_room(n, tmp_path):
-    """Members have their colours in the panel, runs their styles above all: all of it in sight."""
+    """Colours of members are explained in the panel, styles of runs above all panels."""
     labels = [f"another scenario with a long name, controller.k_p = {i}" for i in range(n)]
     figure = plot([Drawn(label, loop_table()) for label in labels], ["plant.eta", "plant.tau"])
     save(figure, tmp_path / "plot.png")
@@ -83,7 +82,7 @@ def test_a_signal_that_one_run_lacks_is_drawn_of_the_other():
 
 
 def test_a_panel_says_which_runs_are_not_in_it():
-    """As with a user's own controller that gives no error, beside the paper's."""
+    """For example a user's own controller without an error, compared with the paper's."""
     own = Drawn("own", table_of(TIME, plant__tau__u=1.0))
     paper = Drawn("paper", table_of(TIME, plant__tau__u=2.0, controller__e__x=0.0))
     for runs, words in (([own, paper], "not in own"), ([own, own, paper], "not in 2 of the runs")):
@@ -91,19 +90,16 @@ def test_a_panel_says_which_runs_are_not_in_it():
         assert titles == {"plant.tau.u": "", "controller.e.x": words}
 
 
-def test_without_patterns_all_vehicles_are_shown():
+def test_without_patterns_the_loops_of_all_vehicles_are_drawn():
+    labels = [axes.get_ylabel() for axes in plot([Drawn("run", loop_table())]).axes]
+    assert labels == ["plant.tau.u\n[N]", "plant.tau\n[N·m]", "controller.theta_hat"]
     table = table_of(TIME, a__tau__u=1.0, b__tau__u=2.0, b__law__e__x=0.0, other=3.0)
     loops = (Loop("a", "a.law"), Loop("b", "b.law"))
     figure = plot([Drawn("run", table, loops=loops)])
     assert [axes.get_ylabel() for axes in figure.axes] == ["a.tau.u", "b.tau.u", "b.law.e.x"]
 
 
-def test_without_patterns_the_loop_is_shown():
-    labels = {axes.get_ylabel() for axes in plot([Drawn("run", loop_table())]).axes}
-    assert labels == {"plant.tau.u\n[N]", "plant.tau\n[N·m]", "controller.theta_hat"}
-
-
-def test_runs_that_differ_in_their_events_only_are_told_apart_by_these():
+def test_runs_that_differ_in_events_only_are_labelled_by_them():
     table = loop_table()
     happened = (Occurrence(2.0, "drop plant.y", "no position"), Occurrence(4.0, "ended"))
     runs = [
@@ -115,8 +111,8 @@ def test_runs_that_differ_in_their_events_only_are_told_apart_by_these():
     assert [run.label for run in told_apart([*runs, runs[0]])] == numbered
 
 
-def test_a_stored_run_of_dotted_components_differs_in_what_differs_only():
-    """Its record does not say where the component ends in the name of a parameter."""
+def test_labels_do_not_depend_on_where_the_name_of_a_component_ends():
+    """A record does not contain it."""
     split = (
         {PortName("a", "b.k"): 1.0, PortName("a", "b.n"): 3},
         {PortName("a.b", "k"): 2.0, PortName("a.b", "n"): 3},
@@ -125,7 +121,7 @@ def test_a_stored_run_of_dotted_components_differs_in_what_differs_only():
     assert [run.label for run in told_apart(runs)] == ["a.b.k = 1", "a.b.k = 2"]
 
 
-def test_what_cannot_be_chosen_is_explained():
+def test_unknown_columns_are_refused_with_a_hint():
     with pytest.raises(InputError, match=r"no column matches 'plant.ta'; did you mean plant.ta"):
         plot([Drawn("run", loop_table())], ["plant.ta"])
     with pytest.raises(InputError, match=r"name the columns to draw; there are mine.a, mine.b"):
@@ -141,8 +137,8 @@ def test_values_that_no_axis_can_show_are_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_units_are_those_of_the_fmus():
-    """Of a group a panel for each unit; the members of a vector share theirs."""
+def test_a_group_has_a_panel_for_each_unit_of_its_fmu():
+    """The members of a vector share a panel."""
     line = np.linspace(0.0, 1.0, 10)
     names = ("own__F__x", "own__F__y", "own__M__z", "own__a", "own__k__1", "own__k__2")
     table = table_of(
