@@ -26,7 +26,7 @@ import numpy as np
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import NATIVE, PYTHON, KindName
 from orchestrator.cosim import Ending, Header, LoopName
-from orchestrator.exchange.hosts.comparison import compare
+from orchestrator.exchange.hosts import compare
 from orchestrator.runs.loading import load
 from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request

@@ -23,8 +23,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import FAILED, OK, describe, say, show
 from orchestrator.cosim import INITIAL, Experiment, write_osp, write_ssp
 from orchestrator.exchange.carried import Carried
-from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
-from orchestrator.exchange.hosts.here import fmi_of
+from orchestrator.exchange.hosts import BOUND, HOSTS, compare, fmi_of
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.machine.errors import InputError, listed
@@ -316,11 +315,11 @@ def _verify_carried(options: argparse.Namespace) -> int:
     for note in carried.notes:
         say(f"warning: {note}")
     judged = []
-    for judgement in carried.judgements(options.tolerance):
-        show(f"{judgement.name}: {judgement.text}")
-        for note in judgement.notes:
-            say(f"warning: {judgement.name}: {note}")
-        judged += [] if judgement.agrees is None else [judgement.agrees]
+    for verdict in carried.verdicts(options.tolerance):
+        show(f"{verdict.name}: {verdict.text}")
+        for note in verdict.notes:
+            say(f"warning: {verdict.name}: {note}")
+        judged += [] if verdict.agrees is None else [verdict.agrees]
     if not judged:
         raise InputError(f"{options.table}: carries no reference results")
     counted = f"{sum(judged)} of {len(judged)} experiments with results agree"

@@ -1,11 +1,11 @@
-"""Tools in environments of their own: `python drivers.py FUNCTION JOB.json ROWS.csv`.
+"""Run a host in its own environment: `python drivers.py FUNCTION JOB.json ROWS.csv`.
 
-It is run by the Python of such an environment, so it imports one tool and the standard library. JOB
-names the FMUs, the wires, the steps and the outputs that are wanted; into ROWS go the seconds that
-the steps took, and the wanted outputs after every step.
+The Python of that environment runs this file, so it imports one tool and the standard library. JOB
+names the FMUs, wires, steps and wanted outputs. The first row of ROWS has the seconds of the steps;
+the others have the wanted outputs after every step.
 """
 
-# ruff: noqa: PLC0415 - only one of the tools is there
+# ruff: noqa: PLC0415 - only one of the tools is installed
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
-#: The name of a job in its folder.
+#: Name of the job file in its folder.
 JOB = "job.json"
 
 #: Wanted outputs after every step.
 Rows = Sequence[Sequence[float]]
 
-#: These, and the seconds of the steps.
+#: Rows, and the seconds of the steps.
 Result = tuple[Rows, float]
 
 
 class Job:
-    """What is to be run.
+    """A run.
 
     Attributes:
-        fmus: the paths of the FMUs, by the names of the components.
-        wires: source and target, each a component and a port.
-        wanted: outputs that are recorded, each a component and a port.
-        steps: how many.
+        fmus: paths of the FMUs by component.
+        wires: pairs of source and target, each a component and a port.
+        wanted: recorded outputs, each a component and a port.
+        steps: number of steps.
         step: communication step [s].
 
     """
@@ -52,17 +52,17 @@ class Job:
         self.step: float = content["step"]
 
     def inputs(self, name: str) -> list[str]:
-        """Inputs of a component that are fed."""
+        """Return the connected inputs of a component."""
         return [port for _, (owner, port) in self.wires if owner == name]
 
     def outputs(self, name: str) -> list[str]:
-        """Outputs of a component that feed something, or are wanted, each once."""
+        """Return the outputs of a component that are connected or wanted, each once."""
         used = [source for source, _ in self.wires] + self.wanted
         return list(dict.fromkeys(port for owner, port in used if owner == name))
 
 
 def sofirpy(job: Job) -> Result:
-    """`simulate`, which logs at the start, and after every step."""
+    """Run `simulate`, which logs at the start and after every step."""
     from sofirpy import simulate
 
     connections = defaultdict(list)
@@ -76,7 +76,7 @@ def sofirpy(job: Job) -> Result:
         )
     logged = {name: job.outputs(name) for name in dict(job.wanted)}
     begin = perf_counter()
-    # It cuts off what lies beyond the end, where rounding may put the last step.
+    # The tool cuts off steps beyond the end, and rounding may put the last step there.
     table = simulate(
         stop_time=(job.steps + 0.5) * job.step,
         step_size=job.step,
@@ -89,7 +89,7 @@ def sofirpy(job: Job) -> Result:
 
 
 def syssimx(job: Job, algorithm: str = "JacobiAlgorithm") -> Result:
-    """A `System` of `FMUComponent`s, which keep their histories, the start with them."""
+    """Run a `System` of `FMUComponent`s, which keep their histories, including the start."""
     from syssimx import Connection, System
     from syssimx.components.fmu import FMUComponent
     from syssimx.system import algorithms
@@ -105,20 +105,20 @@ def syssimx(job: Job, algorithm: str = "JacobiAlgorithm") -> Result:
     result = system.run(t0=0.0, tf=job.steps * job.step, dt=job.step)
     seconds = perf_counter() - begin
     columns = [result[name][1][port] for name, port in job.wanted]
-    # It adds up its time, and where that ends below the end makes a last step of next to nothing.
+    # The tool adds up its time, and makes a tiny last step if the sum falls short of the end.
     return [list(row) for row in zip(*columns, strict=True)][1 : job.steps + 1], seconds
 
 
 def syssimx_gauss_seidel(job: Job) -> Result:
-    """The same in the order that the tool takes if it is given none."""
+    """Run the same in the tool's default order."""
     return syssimx(job, "GaussSeidelAlgorithm")
 
 
 def gemseo_fmu(job: Job) -> Result:
-    """A `TimeSteppingSystem`, which couples by equal names.
+    """Run a `TimeSteppingSystem`, which couples variables of the same name.
 
-    So every discipline is told its ports: some outputs and parameters have one name in several
-    FMUs. Without inputs is None; an empty list is all inputs and parameters.
+    Every discipline gets its ports explicitly, as some outputs and parameters have the same name in
+    several FMUs. `input_names=None` means no inputs; an empty list means all inputs and parameters.
     """
     from gemseo_fmu.disciplines.do_step_fmu_discipline import DoStepFMUDiscipline
     from gemseo_fmu.disciplines.time_stepping_system import TimeSteppingSystem
@@ -141,12 +141,12 @@ def gemseo_fmu(job: Job) -> Result:
     data = system.execute()
     seconds = perf_counter() - begin
     columns = [data[":".join(port)] for port in job.wanted]
-    # The same here.
+    # This tool, too, may make a tiny last step.
     return [[float(x) for x in row] for row in zip(*columns, strict=True)][: job.steps], seconds
 
 
 def pathsim_fmi(job: Job) -> Result:
-    """A block for each FMU, and a `Scope`."""
+    """Run a block for each FMU, and a `Scope`."""
     from pathsim import Connection, Simulation
     from pathsim.blocks import Scope
     from pathsim_fmi import CoSimulationFMU
@@ -168,12 +168,12 @@ def pathsim_fmi(job: Job) -> Result:
     simulation.run(job.steps * job.step)
     seconds = perf_counter() - begin
     _, columns = scope.read()
-    # At t it steps what it then shows: its row of t = 0 is ours after the first step.
+    # The row at t is recorded after the step from t: its row at 0 is ours after the first step.
     return [[float(x) for x in row] for row in zip(*columns, strict=True)][: job.steps], seconds
 
 
 def cofmupy(job: Job) -> Result:
-    """A `Coordinator`, as its configuration is without a word about the method: Jacobi."""
+    """Run a `Coordinator` with its default method, Jacobi."""
     from cofmupy import Coordinator
 
     targets = defaultdict(list)
@@ -198,9 +198,9 @@ def cofmupy(job: Job) -> Result:
 
 
 def sdf4sim(job: Job) -> Result:
-    """A graph of the tool's agents, with an initial token of zero on every wire.
+    """Run a graph of the tool's agents, with an initial token of zero on every wire.
 
-    Its agent of an FMU needs an input, so what has none gets an agent of ours, as does what
+    The tool's agent of an FMU needs an input, so `Source` stands in for FMUs without any; `Sink`
     records.
     """
     from sdf4sim import cs, sdf
@@ -208,7 +208,7 @@ def sdf4sim(job: Job) -> Result:
     step = Fraction(job.step).limit_denominator(10**6)
 
     class Source(sdf.Agent):  # type: ignore[misc]
-        """An FMU without inputs, stepped as `cs.Simulator` steps the others."""
+        """An FMU without inputs, stepped as `cs.Simulator` does."""
 
         def __init__(self, slave: Any) -> None:
             self.fmu, self.times = slave.fmu, count()
@@ -229,7 +229,7 @@ def sdf4sim(job: Job) -> Result:
             return {name: [value] for name, value in zip(self.numbers, values, strict=True)}
 
     class Sink(sdf.Agent):  # type: ignore[misc]
-        """Takes what is wanted; the tool's results keep it."""
+        """Receives the wanted outputs, which the tool's results keep."""
 
         @property
         def inputs(self) -> dict[str, Any]:
@@ -261,15 +261,15 @@ def sdf4sim(job: Job) -> Result:
 
 
 def pycosimlibrary(job: Job) -> Result:
-    """A `JacobiRunner`, which keeps a snapshot at the start and after every step."""
+    """Run a `JacobiRunner`, which keeps a snapshot at the start and after every step."""
     from PyCosimLibrary.jacobi_runner import JacobiRunner
     from PyCosimLibrary.loader import FMULoader
     from PyCosimLibrary.scenario import Connection as Wire
     from PyCosimLibrary.scenario import CosimScenario, OutputConnection, SignalType, VarType
 
     loaded = {name: FMULoader.load(path, name, None) for name, path in job.fmus.items()}
-    for one in loaded.values():
-        one.fmu.instantiate()
+    for loader in loaded.values():
+        loader.fmu.instantiate()
     real = {"value_type": VarType.REAL, "signal_type": SignalType.CONTINUOUS}
 
     def end(side: str, name: str, port: str) -> dict[str, Any]:
@@ -277,7 +277,7 @@ def pycosimlibrary(job: Job) -> Result:
         return {f"{side}_fmu": loaded[name].fmu, f"{side}_vr": numbers}
 
     scenario = CosimScenario(
-        fmus=[one.fmu for one in loaded.values()],
+        fmus=[loader.fmu for loader in loaded.values()],
         connections=[
             Wire(**real, **end("source", *source), **end("target", *target))
             for source, target in job.wires
@@ -295,13 +295,13 @@ def pycosimlibrary(job: Job) -> Result:
 
 
 class Slave(NamedTuple):
-    """An FMU in initialisation mode, the same for both versions of FMI.
+    """An FMU in initialisation mode, with the same calls for both versions of FMI.
 
     Attributes:
-        numbers: value references of its variables.
-        get, set: its numbers, by value references.
+        numbers: value references by variable.
+        get, set: read or write Reals by value references.
         go: ends initialisation mode.
-        step: from a time, for a length [s].
+        step: makes a step from a time, of a length [s].
 
     """
 
@@ -313,7 +313,7 @@ class Slave(NamedTuple):
 
 
 def fmuloader(job: Job) -> Result:
-    """Its slaves: it loads FMUs, and has no master."""
+    """Step the slaves of this loader, which has no master."""
 
     def loaded(name: str, path: str) -> Slave:
         with ZipFile(path) as archive:
@@ -343,7 +343,7 @@ def fmuloader(job: Job) -> Result:
 
 
 def fmpy_slaves(job: Job) -> Result:
-    """Its slaves, of which each is an FMU with the functions of FMI."""
+    """Step fmpy's slaves, whose methods are the functions of FMI."""
     from fmpy import extract, instantiate_fmu, read_model_description
 
     def loaded(name: str, path: str) -> Slave:
@@ -364,7 +364,7 @@ def fmpy_slaves(job: Job) -> Result:
 
 
 def _by_hand(job: Job, loaded: Callable[[str, str], Slave]) -> Result:
-    """Slaves of a tool without a master, stepped side by side by a loop of ours."""
+    """Step the slaves of a tool without a master, all side by side (Jacobi)."""
     slaves = {name: loaded(name, path) for name, path in job.fmus.items()}
     values = dict.fromkeys((source for source, _ in job.wires), 0.0)
 
@@ -398,7 +398,7 @@ def _by_hand(job: Job, loaded: Callable[[str, str], Slave]) -> Result:
 
 
 def write_rows(path: Path, rows: Rows, *seconds: float) -> None:
-    """Write what a host took, and its rows."""
+    """Write the seconds of a host and its rows."""
     with path.open("w", encoding="utf-8", newline="") as lines:
         csv.writer(lines).writerows([seconds, *rows])
 
@@ -406,5 +406,5 @@ def write_rows(path: Path, rows: Rows, *seconds: float) -> None:
 if __name__ == "__main__":
     run: Callable[[Job], Result] = globals()[sys.argv[1]]
     found, taken = run(Job(json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))))
-    # They keep their rows themselves: nothing is read after the steps.
+    # These tools record their rows themselves: reading takes no time.
     write_rows(Path(sys.argv[3]), found, taken, 0.0)
