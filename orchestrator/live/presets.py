@@ -34,7 +34,7 @@ from orchestrator.live.assembly import Plain, assemble, vehicle_data
 from orchestrator.live.module import LICENCES, MODULE, live_module
 from orchestrator.live.programs import REDUCERS, Programs
 from orchestrator.machine.errors import InputError
-from orchestrator.program.reducing import looking_at
+from orchestrator.program.writer import looking_at
 from orchestrator.program.writer import Text
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion

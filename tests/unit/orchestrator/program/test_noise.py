@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fmus.language.build import Program
-from orchestrator.program.noise import is_added
+from orchestrator.program.kind import is_added
 from support.language import module_of
 
 TEXT = """
