@@ -29,8 +29,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
-from orchestrator.program.writer import looking_at
-from orchestrator.program.writer import Text
+from orchestrator.program.writer import Text, looking_at
 from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import (

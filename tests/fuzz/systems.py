@@ -68,8 +68,7 @@ from orchestrator.cosim import (
 )
 from orchestrator.cosim.system.connection import can_feed
 from orchestrator.live import module
-from orchestrator.live.module import MODULE
-from orchestrator.live.programs import OF_PROGRAM, Source
+from orchestrator.live.module import MODULE, OF_PROGRAM, Source
 from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.platforms import platforms

@@ -1,4 +1,4 @@
-"""Where noise is a term of a sum, and where it is not."""
+"""Noise that is a term of a sum, and noise that is not."""
 
 from __future__ import annotations
 
