@@ -1,13 +1,13 @@
-// The page of stored runs: it reads their rows out of itself, and draws them.
+// The page of stored runs: reads their rows from its data, and draws them.
 
-import { Display, element } from "./display";
+import { Display } from "./display";
+import { element, sayFailure, unpacked } from "./dom";
 import { buildSwitches } from "./legend";
 import { longest } from "./panels";
 import { fleetOf } from "./settings";
 import type { Metrics, Occurrence, Run, StoredData, StoredRun, Values } from "./types";
-import { sayFailure, unpacked } from "./unpacking";
 
-/** The rows of a stored run. */
+/** Rows of a stored run. */
 class Stored implements Run {
   readonly actingRow: number;
   readonly columns: readonly string[];
