@@ -104,9 +104,9 @@ _HEADER = """\
  *         ... row[{column}] ...
  *     }}
  *
- * A simulation holds a whole run; there can be several. Nothing is allocated or printed. Structures
- * take up to {stack} bytes of stack at once, or up to twice as many if the compiler inlines
- * functions; the C library takes more.
+ * A simulation holds a whole run; there can be several. Nothing is allocated or printed.
+ * Up to {stack} bytes of structures are on the stack at once, or twice as many if the compiler
+ * inlines functions; the C library takes more.
  */
 #ifndef {NAME}_H
 #define {NAME}_H

@@ -240,8 +240,8 @@ def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkey
 def test_host_is_installed_when_it_is_first_run(dist: Path, monkeypatch):
     """One that cannot be installed does not end the others."""
 
-    def python(pins: Sequence[str], told: Callable[[], object]) -> Path:
-        told()
+    def python(pins: Sequence[str], hear: Callable[[], object]) -> Path:
+        hear()
         if pins == ["fmpy==1"]:
             raise InputError("no such version")
         return Path(sys.executable)
@@ -249,12 +249,12 @@ def test_host_is_installed_when_it_is_first_run(dist: Path, monkeypatch):
     monkeypatch.setattr(hosts, "python_with", python)
     for pin in ("fmpy==1", "fmpy==2"):
         monkeypatch.setitem(HOSTS, pin, replace(HOSTS["fmpy"], pins=[pin]))
-    told: list[str] = []
-    verdicts = list(compare(closed_loop(dist), ["fmpy==1", "fmpy==2"], 50, 0.02, told=told.append))
+    heard: list[str] = []
+    verdicts = list(compare(closed_loop(dist), ["fmpy==1", "fmpy==2"], 50, 0.02, hear=heard.append))
     assert [verdict.failure for verdict in verdicts] == ["no such version", None]
     assert [verdict.package for verdict in verdicts] == ["fmpy 1", "fmpy 2"]
     assert verdicts[1].deviation <= 1e-9
-    assert len(told) == 2 and "fmpy 2" in told[1]
+    assert len(heard) == 2 and "fmpy 2" in heard[1]
 
 
 @pytest.mark.parametrize(
