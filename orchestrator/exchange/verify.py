@@ -284,15 +284,12 @@ class _Samples:
 
     def begin(self, header: Header) -> None:
         """Look up the places of the columns."""
-        self._places = [header.place[name] for name in self._columns]
-        self._integers = [(i, standing) for i, standing in header.places() if standing.c_type]
+        self._places = [(header.place[name], header.standing.get(name)) for name in self._columns]
         self._last = np.empty((0, 1 + len(header.columns)))
 
     def take(self, rows: np.ndarray) -> None:
         """Take the samples between these rows."""
         rows = np.vstack((self._last, rows))
-        for place, standing in self._integers:
-            rows[:, place] = standing.values(rows[:, place])
         self._sample(rows, int(np.searchsorted(self._times, rows[-1, 0], side="right")))
         self._last = rows[-1:].copy()
 
@@ -303,8 +300,9 @@ class _Samples:
 
     def _sample(self, rows: np.ndarray, end: int) -> None:
         times = self._times[self._n : end]
-        for i, place in enumerate(self._places):
-            self.values[self._n : end, i] = np.interp(times, rows[:, 0], rows[:, place])
+        for i, (place, standing) in enumerate(self._places):
+            values = rows[:, place] if standing is None else standing.values(rows[:, place])
+            self.values[self._n : end, i] = np.interp(times, rows[:, 0], values)
         self._n = end
 
 

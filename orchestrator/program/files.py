@@ -73,18 +73,11 @@ _PASSAGES = {
     # Tolerance of values at rest at the start.
     "1e-12 + 1e-12 * fabs(before)": "1e-06 + 1e-06 * fabs(before)",
     """\
-/* Uniform in [0, 1), with 53 bits. */
-static double uniform(generator *it) {
-    uint32_t upper = next_word(it) >> 5, lower = next_word(it) >> 6;
+    uint32_t upper = tempered(x[0]) >> 5, lower = tempered(x[1]) >> 6;
     return (upper * 67108864.0 + lower) * (1.0 / 9007199254740992.0);
-}
 """: """\
-/* Uniform in [0, 1), with the first 24 of Python's 53 bits. */
-static double uniform(generator *it) {
-    uint32_t upper = next_word(it) >> 8;
-    (void)next_word(it);
-    return upper * (1.0 / 16777216.0);
-}
+    /* In single precision, the first 24 of Python's 53 bits: all would be rounded to 1. */
+    return (tempered(x[0]) >> 8) * (1.0 / 16777216.0);
 """,
 }
 
