@@ -33,7 +33,7 @@ from orchestrator.figures.style import printed_unit, reference_colours, vehicle_
 from orchestrator.live.assembly import Plain, assemble, vehicle_data
 from orchestrator.live.module import LICENCES, MODULE, REDUCERS, Programs, live_module
 from orchestrator.machine.errors import InputError
-from orchestrator.program.writer import Text, looking_at
+from orchestrator.program.writer import Text, indices_of
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import Prepared, prepare, with_companion
 from orchestrator.runs.request import Request
@@ -312,7 +312,7 @@ def _measured(text: Text, loop: Loop) -> list[Plain]:
             ],
             "gives": [name for name, ports in reducer.results.items() for _ in ports],
         }
-        for reducer, sources in looking_at(text.plan.system, loop, REDUCERS)
+        for reducer, sources in indices_of(text.plan.system, loop, REDUCERS)
     ]
 
 
@@ -324,7 +324,7 @@ def _ports(text: Text, name: str) -> dict[str, list[str]]:
 
 def _restarted(text: Text, name: str) -> str:
     """Return the message of a component whose state is reset, with `{}` for the time."""
-    return re.sub(r"\{.*?\}", "{}", text.kind(name).said.restarted)
+    return re.sub(r"\{.*?\}", "{}", text.kind(name).behaviour.restarted)
 
 
 def _parameters(text: Text) -> Iterator[Plain]:

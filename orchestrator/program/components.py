@@ -38,7 +38,7 @@ def definitions_of(system: System) -> dict[str, Definition]:
             missing; the message names the component and the reason.
 
     """
-    found: dict[str, Definition] = {}
+    definitions: dict[str, Definition] = {}
     known: dict[str, Definition] = {}
     for name, component in system.components.items():
         if component.digest not in known:
@@ -49,8 +49,8 @@ def definitions_of(system: System) -> dict[str, Definition]:
                 raise InputError(f"{name}: is not in the language of equations: {first}") from None
             except (Misdeclared, InputError) as error:
                 raise InputError(f"{name}: {error}") from None
-        found[name] = known[component.digest]
-    return found
+        definitions[name] = known[component.digest]
+    return definitions
 
 
 def _definition(component: Component) -> Definition:
@@ -131,8 +131,8 @@ def load(script: Path) -> ModuleType:
     finally:
         sys.path.remove(str(folder))
         sys.dont_write_bytecode = writes
-        for other, found in [*sys.modules.items()]:
-            file = getattr(found, "__file__", None)
+        for other, loaded in [*sys.modules.items()]:
+            file = getattr(loaded, "__file__", None)
             if file is not None and other not in _loaded and folder in Path(file).parents:
                 _loaded[other] = Path(file), digest_at(Path(file))
     return module

@@ -288,13 +288,13 @@ class ProgramFiles:
 
     def _constants(self, what: str, names: Iterable[object]) -> dict[str, str]:
         """Return names of constants in C, distinct, by the given names."""
-        found: dict[str, str] = {}
+        constants: dict[str, str] = {}
         for name in map(str, names):
-            one = f"{self._upper}_{what}_{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_')}"
-            while one in found.values():
-                one += "_"
-            found[name] = one
-        return found
+            constant = f"{self._upper}_{what}_{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_')}"
+            while constant in constants.values():
+                constant += "_"
+            constants[name] = constant
+        return constants
 
     def files(self) -> dict[str, str]:
         """Return the texts of the files by name."""
@@ -357,13 +357,13 @@ class ProgramFiles:
         return "\n".join(["enum {", *rows, f"    {self._upper}_{total}", "};"])
 
     def _about(self, name: PortName) -> str:
-        port = self.text.port(name)
+        port = self.text.ports[name]
         return closed(f"{port.description} [{port.unit}]" if port.unit else port.description)
 
     def _value(self, name: PortName) -> str:
         """Return the description of a parameter with its value."""
         value = self.text.start(name)
-        words = [word for word, item in self.text.port(name).choices.items() if item == value]
+        words = [word for word, item in self.text.ports[name].choices.items() if item == value]
         return closed(f"{self._about(name)}: {' '.join([number_in_c(value), *words])}")
 
     # The program
@@ -404,8 +404,8 @@ class ProgramFiles:
                 passing="    if (pass(it, k, t, &noted)) return 1;\n" * text.passes,
             ),
         ]
-        found = re.sub(r"^APART ", "static ", "\n\n".join(parts), flags=re.MULTILINE)
-        return self._precise(_without_unused(found))
+        program = re.sub(r"^APART ", "static ", "\n\n".join(parts), flags=re.MULTILINE)
+        return self._precise(_without_unused(program))
 
     def _number(self, name: PortName) -> float:
         value = self.text.start(name)
@@ -429,8 +429,8 @@ class ProgramFiles:
             for type_, names in _MEMBERS.findall(body):
                 size, alignment = known[type_]
                 widest = max(widest, alignment)
-                for one in names.split(", "):
-                    n = re.search(r"\[(\w+)\]", one)
+                for member in names.split(", "):
+                    n = re.search(r"\[(\w+)\]", member)
                     at += -at % alignment + size * (int(counts.get(n[1], n[1])) if n else 1)
             known[name] = at + -at % widest, widest
         return {name: size for name, (size, _) in known.items()}

@@ -249,18 +249,11 @@ class SystemModel:
         """
         self.text, self.name = Text(plan, definitions, is_tuned=True, is_hosted=True), name
         self.plan, self._definitions, self._title = self.text.plan, definitions, title
-        system = self.plan.system
-        #: Ports of the components.
-        self._known = {
-            PortName(name, port.name): port
-            for name in system.components
-            for port in definitions[name].ports
-        }
-        fed = {connection.target for connection in system.connections}
+        fed = {connection.target for connection in self.plan.system.connections}
         #: Unconnected inputs.
         self._open = [
             name
-            for name, port in self._known.items()
+            for name, port in self.text.ports.items()
             if port.causality == "input" and name not in fed
         ]
 
@@ -269,27 +262,27 @@ class SystemModel:
     @cached_property
     def ports(self) -> tuple[Port, ...]:
         """All ports but `fault`: open inputs, outputs, and parameters with the system's values."""
-        known = self._known.items()
+        known = self.text.ports.items()
         outputs, parameters = (
             [name for name, port in known if port.causality == causality]
             for causality in ("output", "parameter")
         )
         try:
-            found = [self._renamed(name) for name in (*self._open, *outputs, *parameters)]
-            found.append(largest_step(self.plan.experiment.step))
+            ports = [self._renamed(name) for name in (*self._open, *outputs, *parameters)]
+            ports.append(largest_step(self.plan.experiment.step))
             taken = {FAULT.name, TIME.name}
-            for port in found:
+            for port in ports:
                 if port.name in taken:
                     raise Unsupported(f"two variables of the FMU are named {port.name}")
                 taken.add(port.name)
-            found = [*_apart(found)]
-            check_enumerations(tuple(found))
+            ports = [*_with_distinct_enumerations(ports)]
+            check_enumerations(tuple(ports))
         except Misdeclared as error:
             raise Unsupported(str(error)) from None
-        return tuple(found)
+        return tuple(ports)
 
     def _renamed(self, name: PortName) -> Port:
-        port = replace(self._known[name], name=str(name), array=None)
+        port = replace(self.text.ports[name], name=str(name), array=None)
         if port.causality == "output":
             return replace(port, start=None, feedthrough=tuple(self._direct(name)), initially=None)
         return replace(port, start=self.text.start(name), feedthrough=(), initially=())
@@ -299,33 +292,33 @@ class SystemModel:
         if self.text.stages.passing is None:
             # Outputs change only in steps.
             return []
-        sources = {one.target: one.source for one in self.plan.system.connections}
-        found: set[str] = set()
+        sources = {wire.target: wire.source for wire in self.plan.system.connections}
+        inputs: set[str] = set()
         seen, waiting = {output}, [output]
         while waiting:
             at = waiting.pop()
-            for port in self._known[at].feedthrough:
+            for port in self.text.ports[at].feedthrough:
                 name = PortName(at.component, port)
                 if name not in sources:
-                    found.add(port if port == TIME.name else str(name))
+                    inputs.add(port if port == TIME.name else str(name))
                 elif sources[name] not in seen:
                     seen.add(sources[name])
                     waiting.append(sources[name])
-        return [name for name in (*map(str, self._open), TIME.name) if name in found]
+        return [name for name in (*map(str, self._open), TIME.name) if name in inputs]
 
     @cached_property
     def model(self) -> Model:
         """Content of the model description."""
         experiment = self.plan.experiment
-        said = DefaultExperiment(
+        default = DefaultExperiment(
             experiment.stop_time, experiment.step, experiment.start_time, not self.text.slow
         )
-        origins = [one.origin for one in dict.fromkeys(self._definitions.values())]
+        origins = [each.origin for each in dict.fromkeys(self._definitions.values())]
         texts = (
-            "; ".join(dict.fromkeys(filter(None, (getattr(one, field) for one in origins))))
+            "; ".join(dict.fromkeys(filter(None, (getattr(origin, field) for origin in origins))))
             for field in Origin._fields
         )
-        return Model(self.name, self._title, Origin(*texts), self.ports, said)
+        return Model(self.name, self._title, Origin(*texts), self.ports, default)
 
     # Files of the FMU
 
@@ -376,21 +369,23 @@ class SystemModel:
     @cached_property
     def _state(self) -> list[Part]:
         """Parts of the state, on which the rest of a run depends."""
-        found = [Part("it->start_time", FLOAT, [float]), Part("it->made", INT, [int])]
+        parts = [Part("it->start_time", FLOAT, [float]), Part("it->made", INT, [int])]
         for name, member in self.text.members.items():
             kind, owner = self.text.kind(name), f"it->{member}"
-            said, types = kind.said, kind.types
-            found.append(Part(f"{owner}.state", types["state"], [*scalars_of(said.state)]))
+            behaviour, types = kind.behaviour, kind.types
+            parts.append(Part(f"{owner}.state", types["state"], [*scalars_of(behaviour.state)]))
             # Any number is accepted here: enumerations are checked where they are used.
-            found.append(Part(f"{owner}.inputs", types["inputs"], _plain(said.inputs)))
-            numbers, shown = _plain(said.outputs), [f"{owner}_shown"] * (name in self.text.slow)
-            found += [Part(one, types["outputs"], numbers) for one in (f"{owner}.outputs", *shown)]
+            parts.append(Part(f"{owner}.inputs", types["inputs"], _plain_types(behaviour.inputs)))
+            numbers = _plain_types(behaviour.outputs)
+            parts.append(Part(f"{owner}.outputs", types["outputs"], numbers))
+            if name in self.text.slow:
+                parts.append(Part(f"{owner}_shown", types["outputs"], numbers))
             if kind.is_timed:
-                found.append(Part(f"{owner}.time", FLOAT, [float]))
-            found += [Part(f"{owner}.draws[{i}]", FLOAT, [float]) for i in range(said.draws)]
-            if said.draws:
-                found.append(Part(f"{owner}.noise", None, _NOISE_TYPES))
-        return [part for part in found if part.types]
+                parts.append(Part(f"{owner}.time", FLOAT, [float]))
+            parts += [Part(f"{owner}.draws[{i}]", FLOAT, [float]) for i in range(behaviour.draws)]
+            if behaviour.draws:
+                parts.append(Part(f"{owner}.noise", None, _NOISE_TYPES))
+        return [part for part in parts if part.types]
 
     @cached_property
     def _placed(self) -> list[tuple[Part, int]]:
@@ -490,7 +485,7 @@ class SystemModel:
             if kind.has_h_max:
                 longest = f"parameters->{self._longest(member)} * (1.0 + {euler.ROUNDING!r})"
                 lines.append(f"{owner}.longest_step = fmin({longest}, DBL_MAX);")
-            if kind.said.draws:
+            if kind.behaviour.draws:
                 lines.append(f"{owner}.is_noisy = 1;")
         return lines
 
@@ -499,7 +494,7 @@ class SystemModel:
         lines = [line for part, at in self._placed for line in part.take(at)]
         for name, member in self.text.members.items():
             kind = self.text.kind(name)
-            if kind.said.derived and kind.derives_anew:
+            if kind.behaviour.derived and kind.derives_anew:
                 lines.append(f"it->{member}.underived = 1;")
         return lines
 
@@ -511,8 +506,7 @@ class SystemModel:
             cast = "" if place.type == FLOAT else "(int)"
             yield f"{place.text} = {cast}inputs->v[{i}];"
         for name in dict.fromkeys(name.component for name in self._open):
-            said = self.text.kind(name).said
-            if said.derived and said.takes("derive", "inputs"):
+            if self.text.kind(name).derives_from_inputs:
                 yield f"it->{self.text.members[name]}.underived = 1;"
 
     def _renewed(self) -> Iterator[str]:
@@ -523,9 +517,9 @@ class SystemModel:
         stages = self.plan.arrangement.stages
         place = {name: i for i, names in enumerate(stages) for name in names}
         early = {
-            one.source.component
-            for one in self.plan.system.connections
-            if place[one.source.component] >= place[one.target.component]
+            wire.source.component
+            for wire in self.plan.system.connections
+            if place[wire.source.component] >= place[wire.target.component]
         }
         passed = {
             visit.component
@@ -535,7 +529,7 @@ class SystemModel:
         }
         for i, (name, member) in enumerate(self.text.members.items()):
             kind = self.text.kind(name)
-            follows = kind.said.takes("outputs", "parameters") and not kind.said.is_sampled
+            follows = kind.follows_parameters and not kind.behaviour.is_sampled
             if follows and (name not in passed or name in early):
                 yield f"{kind.name}_evaluate(&it->{member}, error);"
                 yield "if (error->raised) {"
@@ -546,7 +540,7 @@ class SystemModel:
     def _check(self, name: str, member: str) -> Iterator[str]:
         """Yield statements that check the parameters of a component."""
         kind = self.text.kind(name)
-        if kind.said.hooks["check"]:
+        if kind.behaviour.hooks["check"]:
             call = kind.call("check", parameters=f"parameters->{member}")
             yield "if (!error->raised) {"
             yield f"    {call};"
@@ -556,7 +550,7 @@ class SystemModel:
     def _check_state(self, name: str, member: str) -> Iterator[str]:
         """Yield statements that check the state of a component."""
         kind = self.text.kind(name)
-        if not kind.said.hooks["check_state"]:
+        if not kind.behaviour.hooks["check_state"]:
             return
         given = {"parameters": f"parameters->{member}", "state": "of_one"}
         yield "if (!error->raised) {"
@@ -580,12 +574,12 @@ class SystemModel:
         yield array("string *const model_inputs_of", inputs)
 
 
-def _plain(hint: Any) -> list[Any]:
+def _plain_types(hint: Any) -> list[Any]:
     """Return the types of numbers, int for enumerations."""
     return [int if is_class(scalar, IntEnum) else scalar for scalar in scalars_of(hint)]
 
 
-def _apart(ports: Sequence[Port]) -> Iterator[Port]:
+def _with_distinct_enumerations(ports: Sequence[Port]) -> Iterator[Port]:
     """Yield ports with distinct names for different enumerations."""
     taken: dict[str, Mapping[str, int]] = {}
     for port in ports:

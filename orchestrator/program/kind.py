@@ -77,32 +77,35 @@ class Kind:
     is_alone: bool = False
 
     def __post_init__(self) -> None:
-        said = self.said = self.definition.behaviour
+        behaviour = self.behaviour = self.definition.behaviour
         self.types = {
-            "parameters": type_of(said.parameters),
-            "inputs": type_of(said.inputs),
-            "state": type_of(said.state),
-            "outputs": type_of(said.outputs),
-            "derived": type_of(said.derived or Nothing),
+            "parameters": type_of(behaviour.parameters),
+            "inputs": type_of(behaviour.inputs),
+            "state": type_of(behaviour.state),
+            "outputs": type_of(behaviour.outputs),
+            "derived": type_of(behaviour.derived or Nothing),
         }
-        self.is_timed = said.takes("outputs", "t") or said.takes("derive", "t")
-        self.follows_inputs = said.takes("outputs", "inputs")
-        self.derives_anew = any(said.takes("derive", name) for name in ("state", "inputs", "t"))
-        self.steps = said.hooks["update"] is not None
-        self.has_h_max = said.h_max is not None
+        self.is_timed = behaviour.takes("outputs", "t") or behaviour.takes("derive", "t")
+        self.follows_inputs = behaviour.takes("outputs", "inputs")
+        self.follows_parameters = behaviour.takes("outputs", "parameters")
+        self.derives_from_inputs = bool(behaviour.derived) and behaviour.takes("derive", "inputs")
+        derived_from = ("state", "inputs", "t")
+        self.derives_anew = any(behaviour.takes("derive", name) for name in derived_from)
+        self.steps = behaviour.hooks["update"] is not None
+        self.has_h_max = behaviour.h_max is not None
 
     @cached_property
     def ports(self) -> Mapping[str, Sequence[Port]]:
         """Its ports by causality, in the order of the numbers in their group."""
-        found: dict[str, list[Port]] = {"input": [], "output": [], "parameter": []}
+        ports: dict[str, list[Port]] = {"input": [], "output": [], "parameter": []}
         for port in self.definition.ports:
             if port.name != H_MAX or not self.has_h_max:
-                found[port.causality].append(port)
-        return found
+                ports[port.causality].append(port)
+        return ports
 
     def text(self) -> Iterator[str]:
         """Yield its functions."""
-        if self.said.draws:
+        if self.behaviour.draws:
             yield self._draw()
         yield self._evaluate()
         if self.foreseen:
@@ -149,7 +152,7 @@ class Kind:
         """Return its structure."""
         rows = [f"{self._type(what)} {what};" for what in ("parameters", "inputs", "state")]
         rows.append(f"{self._type('outputs')} outputs;")
-        if self.said.derived:
+        if self.behaviour.derived:
             rows.append(f"{self._type('derived')} derived;")
             rows.append("int underived; /* if set, it must be derived again before use */")
         if self.steps:
@@ -159,8 +162,8 @@ class Kind:
         if self.tells:
             rows.append("double restarted; /* time at which a guard first reset the state [s] */")
             rows.append("int has_restarted;")
-        if self.said.draws:
-            rows.append(f"double draws[{self.said.draws}];")
+        if self.behaviour.draws:
+            rows.append(f"double draws[{self.behaviour.draws}];")
             rows.append("int is_noisy; /* if set, draws make a difference */")
             rows.append("int has_noise; /* if set, the noise has begun */")
             rows.append("int undrawn; /* number of draws that are still to be made */")
@@ -168,7 +171,7 @@ class Kind:
         return f"/* {closed(self.definition.summary)} */\n{structure(self.name, rows)}"
 
     def _derive(self, state: str, time: str) -> list[str]:
-        if not self.said.derived:
+        if not self.behaviour.derived:
             return []
         derived = f"it->derived = {self.call('derive', state=state, t=time)};"
         return ["if (it->underived) {", f"    {derived}", "    it->underived = error->raised;", "}"]
@@ -176,12 +179,12 @@ class Kind:
     @property
     def tells(self) -> bool:
         """True if it keeps the time at which a guard first reset its state."""
-        return self.is_tuned and self.said.hooks["credible"] is not None
+        return self.is_tuned and self.behaviour.hooks["credible"] is not None
 
     def _guarded(self, *, tells: bool = False) -> list[str]:
         """Return statements that copy the state, and reset it if a guard says so."""
         lines = [f"{self._type('state')} state = it->state;"]
-        if self.said.hooks["credible"]:
+        if self.behaviour.hooks["credible"]:
             lines.append(f"if (!{self.call('credible', state='state')}) {{")
             lines.append(f"    state = {self.call('restarted', state='state')};")
             if tells:
@@ -192,13 +195,13 @@ class Kind:
 
     def _computed(self) -> list[str]:
         """Return statements that compute the outputs."""
-        is_guarded = self.said.hooks["credible"] is not None
+        is_guarded = self.behaviour.hooks["credible"] is not None
         lines, state = self._guarded() * is_guarded, "state" if is_guarded else "it->state"
-        if self.said.takes("outputs", "derived"):
+        if self.behaviour.takes("outputs", "derived"):
             lines += self._derive(state, "it->time")
         lines.append(f"{self._type('outputs')} outputs = {self.call('outputs', state=state)};")
-        if self.said.draws:
-            group = f"outputs.{in_c(self.said.noisy)}"
+        if self.behaviour.draws:
+            group = f"outputs.{in_c(self.behaviour.noisy)}"
             type_ = self.functions["measured"].returns
             lines.append(f"const {self.emitter.type(type_)} exact = {group};")
             measured = f"{group} = {self._measured('it->draws', 'exact')};"
@@ -232,21 +235,21 @@ class Kind:
 
     def _measured(self, draws: str, group: str) -> str:
         type_ = self.functions["measured"].arguments["n"]
-        n = initializer(type_, (f"{draws}[{i}]" for i in range(self.said.draws)))
+        n = initializer(type_, (f"{draws}[{i}]" for i in range(self.behaviour.draws)))
         n = n if isinstance(type_, Scalar) else f"({self.emitter.type(type_)}){n}"
-        return self.call("measured", **{"n": n, self.said.noisy: group})
+        return self.call("measured", **{"n": n, self.behaviour.noisy: group})
 
     def _start(self) -> str:
-        said, lines = self.said, list[str]()
-        if said.hooks["check"]:
+        behaviour, lines = self.behaviour, list[str]()
+        if behaviour.hooks["check"]:
             lines.append(f"{self.call('check')};")
         if self.is_timed:
             lines.append("it->time = t;")
-        if said.derived:
+        if behaviour.derived:
             lines.append("it->underived = 1;")
-        if said.draws:
+        if behaviour.draws:
             lines += ["if (!it->has_noise) {", *(f"    {line}" for line in self._seed()), "}"]
-        if said.hooks["start"]:
+        if behaviour.hooks["start"]:
             lines.append(f"it->state = {self.call('start', t='t')};")
             if sound := self.is_sound("it->state"):
                 lines.append(f"if (!({sound})) {_UNSOUND}")
@@ -259,11 +262,11 @@ class Kind:
     def _may_skip(self) -> bool:
         """True if noise that is multiplied by zero need not be drawn."""
         # Changed parameters may make it count, as may a product with the measured values.
-        return not self.is_tuned and is_added(self.functions["measured"], "n", self.said.noisy)
+        return not self.is_tuned and is_added(self.functions["measured"], "n", self.behaviour.noisy)
 
     def _seed(self) -> list[str]:
         """Return statements that begin the noise, and find out whether it makes a difference."""
-        n, type_ = self.said.draws, self.functions["measured"].returns
+        n, type_ = self.behaviour.draws, self.functions["measured"].returns
         name = self.emitter.type(type_)
         # All differ: a difference of equal numbers would be zero.
         large = ", ".join(f"{_LARGE / (1.0 + 0.37 * i)!r}" for i in range(n))
@@ -296,16 +299,16 @@ class Kind:
                 f"    seed_generator(&it->noise, (uint32_t){self.call('seed')});",
                 "}",
                 "for (; it->undrawn > 0; it->undrawn--) {",
-                f"    draw_normals(&it->noise, it->draws, {self.said.draws});",
+                f"    draw_normals(&it->noise, it->draws, {self.behaviour.draws});",
                 "}",
             ],
             (),
         )
 
     def _advance(self) -> str:
-        said, lines = self.said, list[str]()
+        behaviour, lines = self.behaviour, list[str]()
         if self.is_timed:
-            anew = " it->underived = 1;" * said.takes("derive", "t")
+            anew = " it->underived = 1;" * behaviour.takes("derive", "t")
             lines += ["if (it->time != t) {", f"    it->time = t;{anew}", "}"]
         if self.steps:
             split = self.emitter.call(self.euler["internal_steps"], ["h", "it->longest_step"])
@@ -323,10 +326,10 @@ class Kind:
                 "for (int i = 0; i < n && !error->raised; i++) {",
             ]
             time = "t + i * step"
-            if said.takes("update", "derived"):
+            if behaviour.takes("update", "derived"):
                 lines += [f"    {line}" for line in self._derive("state", time)]
             lines.append(f"    state = {self.call('update', state='state', t=time, h='step')};")
-            if said.takes("derive", "state") or said.takes("derive", "t"):
+            if behaviour.takes("derive", "state") or behaviour.takes("derive", "t"):
                 lines.append("    it->underived = 1;")
             lines.append("}")
             if self.is_checked:
@@ -336,18 +339,18 @@ class Kind:
             lines.append("it->state = state;")
         if self.is_timed:
             lines.append("it->time = end;")
-            if said.takes("derive", "t") and not self.steps:
+            if behaviour.takes("derive", "t") and not self.steps:
                 lines.append("it->underived = 1;")
-        if said.draws:
+        if behaviour.draws:
             lines += ["it->undrawn++;", f"if (it->is_noisy) {self.name}_draw(it);"]
-        if not said.is_sampled and not self.follows_inputs:
+        if not behaviour.is_sampled and not self.follows_inputs:
             lines.append(f"{self.name}_evaluate(it, error);")
         return self._function("advance", ", double t, double h, double end", lines)
 
     def _adopt(self) -> str:
         """Return the function that adopts changed parameters."""
-        lines = [f"{self.call('check')};"] if self.said.hooks["check"] else []
-        lines += ["it->underived = 1;"] * bool(self.said.derived)
+        lines = [f"{self.call('check')};"] if self.behaviour.hooks["check"] else []
+        lines += ["it->underived = 1;"] * bool(self.behaviour.derived)
         return self._function("adopt", "", lines or ["(void)it;"])
 
 
@@ -368,7 +371,7 @@ def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
     if _MANY <= len(floats) == len(places) and not _has_gaps(type_):
         called = f"{name}((const double *)&{text}, {len(floats)})"
         return called if name == "are_finite" else f"{called} {test}"
-    return f"{' + '.join(term.format(one) for one in floats)} {test}"
+    return f"{' + '.join(term.format(text) for text in floats)} {test}"
 
 
 class _Mixed(Exception):

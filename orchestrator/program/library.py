@@ -66,7 +66,7 @@ class Source:
     @classmethod
     def of(cls, text: Text) -> Source:
         """Make the source of a text."""
-        n = sum(len(ports) for one in text.indices for ports in one.reducer.results.values())
+        n = sum(len(ports) for index in text.indices for ports in index.reducer.results.values())
         return cls(text.text(), tuple(map(str, text.parameters)), tuple(map(str, text.columns)), n)
 
     def with_library(self) -> Source:
@@ -100,7 +100,7 @@ class Program:
         self.source = source
         self._library = _loaded(source)
         self._size = self._library.size_of_simulation()
-        self._own = _Own()
+        self._memory = _ThreadMemory()
 
     def run(
         self,
@@ -119,7 +119,7 @@ class Program:
             Its indices, NaN for missing ones; None: a component has refused a value.
 
         """
-        memory, library = self._own.memory(self._size), self._library
+        memory, library = self._memory.of_size(self._size), self._library
         steps = experiment.rows - 1
         if library.begin(
             memory, values.ctypes.data, experiment.start_time, experiment.step,
@@ -128,19 +128,19 @@ class Program:
             return None
         if library.run(memory, steps, None if rows is None else rows.ctypes.data):
             return None
-        found = np.empty(self.source.n_indices)
-        if len(found) and library.indices(memory, found.ctypes.data):
+        indices = np.empty(self.source.n_indices)
+        if len(indices) and library.indices(memory, indices.ctypes.data):
             return None
-        return found
+        return indices
 
 
-class _Own(local):
+class _ThreadMemory(local):
     """Memory of a simulation, one per thread."""
 
     def __init__(self) -> None:
         self._memory = create_string_buffer(1)
 
-    def memory(self, size: int) -> c_void_p:
+    def of_size(self, size: int) -> c_void_p:
         if len(self._memory) < size:
             self._memory = create_string_buffer(size)
         return self._memory  # type: ignore[return-value]

@@ -15,8 +15,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -317,63 +318,64 @@ class Equations:
             Unsupported: a component is outside the language of equations.
 
         """
-        definitions, reducers = [*definitions], [*reducers]
-        counts = Counter[Any]([*definitions, *map(id, reducers)])
-        distinct = [*dict.fromkeys(definitions)]
-        hooks = {one: one.behaviour.hooks for one in distinct}
+        counts, reducer_counts = Counter(definitions), Counter(map(id, reducers := [*reducers]))
+        by_id = {id(reducer): reducer for reducer in reducers}
         euler: Any = EULER
-        by_identity = {id(one): one for one in reducers}
+        hooks = {
+            definition: {name: hook for name, hook in definition.behaviour.hooks.items() if hook}
+            for definition in counts
+        }
+        index_hooks = [hook for reducer in by_id.values() for hook in reducer.hooks.values()]
         program = Program(
-            *(hook for one in distinct for hook in hooks[one].values() if hook),
+            *chain.from_iterable(of_one.values() for of_one in hooks.values()),
             *euler,
-            *(hook for one in by_identity.values() for hook in one.hooks.values()),
+            *index_hooks,
         )
         try:
             program.check()
         except Untranslatable as error:
             raise Unsupported(str(error).splitlines()[0]) from None
         trees = {
-            one: {name: program.function(hook) for name, hook in hooks[one].items() if hook}
-            for one in distinct
+            definition: {name: program.function(hook) for name, hook in of_one.items()}
+            for definition, of_one in hooks.items()
         }
-        looks = (hook for one in by_identity.values() for hook in one.hooks.values())
         self._is_inlined = is_quick
         # A loop that waits for a number to change may never end if it is NaN.
         waits = _waiting(program.functions.values())
-        self.is_quick = is_quick and waits.isdisjoint(map(program.function, looks))
-        waiting = {one for one in distinct if not waits.isdisjoint(trees[one].values())}
-        checked = waiting.union(*map(feeding, waiting)) if self.is_quick else {*distinct}
+        self.is_quick = is_quick and waits.isdisjoint(map(program.function, index_hooks))
+        waiting = {one for one in trees if not waits.isdisjoint(trees[one].values())}
+        checked = waiting.union(*map(feeding, waiting)) if self.is_quick else {*trees}
         self.emitter = Emitter(program.functions.values(), _MOST_COPIED)
-        self._euler = {one.__name__: program.function(one) for one in euler}
+        self._euler = {equation.__name__: program.function(equation) for equation in euler}
         self.kinds = {
-            one: Kind(
-                one,
-                trees[one],
+            definition: Kind(
+                definition,
+                functions,
                 self.emitter,
-                self.emitter.unused(f"{_lower(one.name)}_component"),
+                self.emitter.unused(f"{_lower(definition.name)}_component"),
                 self._euler,
                 is_tuned,
-                one in checked,
-                () if one in checked else foreseen(one),
-                is_quick and counts[one] == 1,
+                definition in checked,
+                () if definition in checked else foreseen(definition),
+                is_quick and counts[definition] == 1,
             )
-            for one in distinct
+            for definition, functions in trees.items()
         }
         self.reducers = {
             key: ReducerText(
-                one,
+                reducer,
                 program,
                 self.emitter,
-                self.emitter.unused(f"{_lower(one.name)}_index"),
-                is_quick and counts[key] == 1,
+                self.emitter.unused(f"{_lower(reducer.name)}_index"),
+                is_quick and reducer_counts[key] == 1,
             )
-            for key, one in by_identity.items()
+            for key, reducer in by_id.items()
         }
 
     @property
     def is_noisy(self) -> bool:
         """True if a component draws random numbers."""
-        return any(kind.said.draws for kind in self.kinds.values())
+        return any(kind.behaviour.draws for kind in self.kinds.values())
 
     def text(self) -> list[str]:
         """Return the parts of the text."""
@@ -407,23 +409,19 @@ class Equations:
                 Emitter(self._euler.values()).text(),
                 _CHECKS,
                 *structures,
-                *(f"{one};" for one in heads),
+                *(f"{head};" for head in heads),
             ]
         )
 
     @cached_property
     def _structures(self) -> list[str]:
-        return [
-            *(one.structure() for one in self.kinds.values()),
-            *(one.structure() for one in self.reducers.values()),
-        ]
+        parts = (*self.kinds.values(), *self.reducers.values())
+        return [part.structure() for part in parts]
 
     @cached_property
     def _functions(self) -> list[str]:
-        return [
-            *(part for one in self.kinds.values() for part in one.text()),
-            *(part for one in self.reducers.values() for part in one.text()),
-        ]
+        parts = (*self.kinds.values(), *self.reducers.values())
+        return [text for part in parts for text in part.text()]
 
 
 def head_of(equations: Equations) -> str:
@@ -435,7 +433,7 @@ def head_of(equations: Equations) -> str:
     return "\n\n".join(_GUARD.sub("", part).strip() for part in parts)
 
 
-class Looking(NamedTuple):
+class Index(NamedTuple):
     """An index of a system, and the sources of its signals.
 
     Attributes:
@@ -448,7 +446,7 @@ class Looking(NamedTuple):
     sources: Sequence[PortName | float]
 
 
-def looking_at(system: System, loop: Loop, reducers: Iterable[Reducer]) -> Iterator[Looking]:
+def indices_of(system: System, loop: Loop, reducers: Iterable[Reducer]) -> Iterator[Index]:
     """Yield the indices of a loop for which a system has all signals and parameters."""
     names = [
         f"{name}.{variable.name}"
@@ -458,14 +456,14 @@ def looking_at(system: System, loop: Loop, reducers: Iterable[Reducer]) -> Itera
     ]
     places = {name: i for i, name in enumerate(names)}
     for reducer in reducers:
-        found = sources_of(reducer, loop, places, {})
-        if not found.missing:
-            constants = {port: float(value) for port, value in found.constants.items()}
+        signals = sources_of(reducer, loop, places, {})
+        if not signals.missing:
+            constants = {port: float(value) for port, value in signals.constants.items()}
             ports = {
-                port: system.named(PortName.read(names[i])) for port, i in found.places.items()
+                port: system.named(PortName.read(names[i])) for port, i in signals.places.items()
             }
             sources: dict[str, PortName | float] = {**constants, **ports}
-            yield Looking(reducer, [sources[port.name] for port in reducer.ports])
+            yield Index(reducer, [sources[port.name] for port in reducer.ports])
 
 
 @dataclass
@@ -487,14 +485,12 @@ class Text:
 
     plan: Plan
     definitions: Mapping[str, Definition]
-    indices: Sequence[Looking] = ()
+    indices: Sequence[Index] = ()
     is_tuned: bool = False
     is_hosted: bool = False
     alters: bool = False
     is_quick: bool = False
     shared: Equations | None = None
-    #: Functions of connections that map values: beginnings by the rest of the text.
-    mappings: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Translate the equations.
@@ -504,7 +500,8 @@ class Text:
                 component is outside the language of equations.
 
         """
-        system = self.plan.system
+        #: Functions of connections that map values: beginnings by the rest of the text.
+        self._mappings: dict[str, str] = {}
         if self.plan.rings:
             names = listed(self.plan.rings[0])
             raise Unsupported(
@@ -516,6 +513,7 @@ class Text:
         self.plan = replace(
             self.plan, experiment=replace(self.plan.experiment, order=arrangement.order)
         )
+        system = self.plan.system
         self.stages: Stages[Stage] = stages_of(system, arrangement, self.plan.decimations)
         self.passes = self.stages.passing is not None
         self.is_tuned = self.is_tuned or self.alters
@@ -524,7 +522,7 @@ class Text:
         self.slow = [name for name, n in self.plan.decimations.items() if n > 1]
         self.equations = self.shared or Equations(
             (self.definitions[name] for name in self.components),
-            [one.reducer for one in self.indices],
+            [index.reducer for index in self.indices],
             self.is_tuned,
             self.is_quick,
             self._foreseen,
@@ -571,7 +569,7 @@ class Text:
 
     def start(self, name: PortName) -> float | int | bool:
         """Return the value of a parameter or an unconnected input at the start."""
-        value, port = self.plan.system.value(name), self.port(name)
+        value, port = self.plan.system.value(name), self.ports[name]
         if isinstance(value, str):
             variable = self.plan.system.components[name.component].variable(name.port)
             value = int(variable.items[value])
@@ -610,7 +608,7 @@ class Text:
         """Return the outputs that are passed on before the inputs of their component are known."""
         if not self.passes:
             return []
-        sources = dict.fromkeys(one.source for one in self.plan.system.connections)
+        sources = dict.fromkeys(wire.source for wire in self.plan.system.connections)
         return [
             *dict.fromkeys(
                 source.port
@@ -623,9 +621,9 @@ class Text:
     def _feeding(self, definition: Definition) -> Iterable[Definition]:
         """Yield the definitions of components that feed components of this definition."""
         return (
-            self.definitions[one.source.component]
-            for one in self.plan.system.connections
-            if self.definitions[one.target.component] is definition
+            self.definitions[wire.source.component]
+            for wire in self.plan.system.connections
+            if self.definitions[wire.target.component] is definition
         )
 
     # The text
@@ -648,7 +646,7 @@ class Text:
     def _own(self) -> list[str]:
         # Writing these adds to the mappings.
         simulation, rest, steps = self._simulation(), self._rest(), self._steps()
-        mappings = (head + body for body, head in self.mappings.items())
+        mappings = (head + body for body, head in self._mappings.items())
         return [simulation, _TIMES, *mappings, rest, *steps]
 
     def calls(self) -> list[str]:
@@ -733,9 +731,9 @@ class Text:
         turn = {name: i for i, name in enumerate(order)}
         # Components that feed others before their own turn.
         early = {
-            one.source.component
-            for one in system.connections
-            if turn[one.source.component] >= turn[one.target.component]
+            wire.source.component
+            for wire in system.connections
+            if turn[wire.source.component] >= turn[wire.target.component]
         }
         settled, passed = ["int changed = 0, other;"], list[str]()
         for name in order:
@@ -755,7 +753,7 @@ class Text:
         starts = []
         for connection in system.connections:
             place = self.columns[connection.target]
-            start = self.port(connection.target).start
+            start = self.ports[connection.target].start
             number = number_in_c(_as(place, 0 if start is None else start))
             starts.append(f"{place.text} = {number};")
         lines = [
@@ -825,11 +823,11 @@ class Text:
 
     def _anew(self, name: str) -> Iterator[str]:
         """Yield statements that compute the outputs after other inputs at the start."""
-        said, member = self.kind(name).said, f"it->{self.members[name]}"
+        kind, member = self.kind(name), f"it->{self.members[name]}"
         yield from self.checked_inputs(name)
-        if said.derived and said.takes("derive", "inputs"):
+        if kind.derives_from_inputs:
             yield f"{member}.underived = 1;"
-        yield f"{self.kind(name).name}_evaluate(&{member}, error);"
+        yield f"{kind.name}_evaluate(&{member}, error);"
         yield self._refusal(name, OUTPUTS)
         if name in self.slow:
             yield f"{member}_shown = {member}.outputs;"
@@ -837,10 +835,14 @@ class Text:
     def _refusal(self, name: str, call: str) -> str:
         return f"if (error->raised) return refused(it, {self.components.index(name)}, {call}, 0);"
 
-    def port(self, name: PortName) -> Port:
-        """Return a port of a component, as its author declared it."""
-        ports = self.definitions[name.component].ports
-        return next(port for port in ports if port.name == name.port)
+    @cached_property
+    def ports(self) -> Mapping[PortName, Port]:
+        """Ports of all components, as their authors declared them."""
+        return {
+            PortName(name, port.name): port
+            for name in self.components
+            for port in self.definitions[name].ports
+        }
 
     # Values along connections
 
@@ -850,11 +852,13 @@ class Text:
         feeding = self.plan.system.feeding[name]
         # A product may be infinite, and a whole number too large.
         changed = {
-            one.target for one in feeding if self.alters or isinstance(one.transformation, Linear)
+            wire.target
+            for wire in feeding
+            if self.alters or isinstance(wire.transformation, Linear)
         }
         if self.alters:
             changed |= {*found}
-            if any(found[one.target].type != FLOAT for one in feeding):
+            if any(found[wire.target].type != FLOAT for wire in feeding):
                 number = self.components.index(name)
                 yield f"if (error->raised) return refused(it, {number}, {INPUT}, -1);"
         for i, (port, (target, place)) in enumerate(
@@ -868,7 +872,8 @@ class Text:
             if port.maximum is not None:
                 tests.append(f"{place.text} <= {number_in_c(_as(place, port.maximum))}")
             if port.choices:
-                among = " || ".join(f"{place.text} == {int(one)}" for one in port.choices.values())
+                items = port.choices.values()
+                among = " || ".join(f"{place.text} == {int(item)}" for item in items)
                 tests.append(f"({among})")
             if tests:
                 text = tests[0] if len(tests) == 1 and not port.choices else " && ".join(tests)
@@ -897,7 +902,7 @@ class Text:
             for a, b in change.pairs
         )
         body = f"(double value) {{\n{tests}    return ({of})value;\n}}"
-        head = self.mappings.setdefault(body, f"static {of} mapped_{len(self.mappings)}")
+        head = self._mappings.setdefault(body, f"static {of} mapped_{len(self._mappings)}")
         return f"{head.rpartition(' ')[2]}({value})"
 
     # Rows
@@ -1041,9 +1046,9 @@ class Text:
             [*lines, "return is_sound;"],
         )
 
-    def _made(self, name: str, doc: str, found: Sequence[Stage], begin: Sequence[str]) -> str:
+    def _made(self, name: str, doc: str, stages: Sequence[Stage], begin: Sequence[str]) -> str:
         lines = [*begin]
-        for stage in found:
+        for stage in stages:
             inner = list(self._stage(stage))
             if (when := stage.decimation) is not None:
                 k = "(k + 1)" if when.at_end else "k"
@@ -1051,7 +1056,7 @@ class Text:
                 lines += [test, *(f"    {line}" for line in inner), "}"]
             else:
                 lines += inner
-        if found is self.stages.stepping and found[-1].decimation is not None:
+        if stages is self.stages.stepping and stages[-1].decimation is not None:
             # The last stage, which checks the values, is not part of every step.
             lines += self._unsound()
         return f"/* {doc}. Returns 1 if a component refuses. */\n" + function(
@@ -1061,7 +1066,7 @@ class Text:
         )
 
     def _stage(self, stage: Stage) -> Iterator[str]:
-        values = [(self.columns[one.target].text, self.value(one)) for one in stage.connections]
+        values = [(self.columns[wire.target].text, self.value(wire)) for wire in stage.connections]
         yield from _copies(values, self._arrays)
         shown = {
             port: place
@@ -1070,7 +1075,7 @@ class Text:
             for port, place in self._outputs(name).items()
         }
         yield from _copies(
-            [(self.columns[one].text, shown[one].text) for one in stage.shows if one in shown]
+            [(self.columns[port].text, shown[port].text) for port in stage.shows if port in shown]
         )
         visits = [visit for visit in stage.visits if isinstance(visit, Visit)]
         for visit in visits:
@@ -1081,7 +1086,7 @@ class Text:
             yield from self._unsound()
         for visit in visits:
             kind = self.kind(visit.component)
-            is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)
+            is_stale = kind.follows_inputs and not (kind.behaviour.is_sampled and visit.steps)
             if is_stale and self.reads(visit):
                 is_early = bool(kind.foreseen) and visit.steps and not visit.takes
                 # The shown outputs of a slow component must not be computed again before.
@@ -1090,16 +1095,16 @@ class Text:
 
     def _visited(self, visit: Visit, every: int) -> Iterator[str]:
         name, kind = visit.component, self.kind(visit.component)
-        member, said = f"it->{self.members[name]}", kind.said
+        member, behaviour = f"it->{self.members[name]}", kind.behaviour
         if visit.takes:
             yield from self.checked_inputs(name)
-            if said.derived and said.takes("derive", "inputs"):
+            if kind.derives_from_inputs:
                 yield f"{member}.underived = 1;"
         if not visit.steps:
             return
-        if said.is_sampled:
+        if behaviour.is_sampled:
             timed = [f"{member}.time = t;"] * kind.is_timed
-            timed += [f"{member}.underived = 1;"] * bool(timed and said.takes("derive", "t"))
+            timed += [f"{member}.underived = 1;"] * bool(timed and behaviour.takes("derive", "t"))
             anew = list(self._evaluated(name))
             lines = timed if visit.takes else [*timed, *anew]
             if timed:
@@ -1141,7 +1146,7 @@ class Text:
 
     def _event_tables(self) -> str:
         """Return the tables of numbers that a host and events can set or read."""
-        fed = {one.target: one.transformation for one in self.plan.system.connections}
+        fed = {wire.target: wire.transformation for wire in self.plan.system.connections}
         places = {name: i for i, name in enumerate(self.columns)}
         inputs = []
         for name in self.inputs:
@@ -1180,7 +1185,7 @@ class Text:
                 f"{kind.name}_adopt(&it->{member}, error);",
                 f"if (error->raised) return refused(it, {i}, AT_SET, 0);",
             ]
-            if self.passes and (kind.follows_inputs or kind.said.takes("outputs", "parameters")):
+            if self.passes and (kind.follows_inputs or kind.follows_parameters):
                 # Outputs that depend on the parameters change at once.
                 lines += self._evaluated(name)
             cases[i] = [*lines, "return 0;"]
@@ -1191,7 +1196,7 @@ class Text:
         cases = {
             i: [
                 f"feed_{i}(it, now, error);",
-                *([f"it->{member}.has_noise = 0;"] * bool(self.kind(name).said.draws)),
+                *([f"it->{member}.has_noise = 0;"] * bool(self.kind(name).behaviour.draws)),
                 f"return start_{i}(it, t, error);",
             ]
             for i, (name, member) in enumerate(self.members.items())
@@ -1239,12 +1244,12 @@ def _waiting(functions: Iterable[tree.Function]) -> set[tree.Function]:
         functions: functions, each after those that it calls.
 
     """
-    found = set[tree.Function]()
-    for one in functions:
-        loops = any(isinstance(part, tree.While) for part in tree.statements_in(one.body))
-        if loops or any(call.function in found for call in tree.calls_in(one.body)):
-            found.add(one)
-    return found
+    waiting = set[tree.Function]()
+    for each in functions:
+        loops = any(isinstance(part, tree.While) for part in tree.statements_in(each.body))
+        if loops or any(call.function in waiting for call in tree.calls_in(each.body)):
+            waiting.add(each)
+    return waiting
 
 
 def _as(place: Place, value: float) -> float:
@@ -1271,11 +1276,11 @@ _ELEMENT = re.compile(r"(\(int\))?(.+)\[(\d+)\]")
 def _copies(values: Sequence[tuple[str, str]], arrays: Mapping[str, str] = {}) -> Iterator[str]:
     """Yield assignments: one for a whole array, and a loop for neighbours."""
     run: list[tuple[str, str]] = []
-    for one in [*values, ("", "")]:
-        if run and not _follows(run[-1], one):
+    for assignment in [*values, ("", "")]:
+        if run and not _follows(run[-1], assignment):
             yield from _copied(run, arrays)
             run = []
-        run.append(one)
+        run.append(assignment)
 
 
 def _follows(one: tuple[str, str], other: tuple[str, str]) -> bool:
@@ -1305,14 +1310,14 @@ def _copied(run: Sequence[tuple[str, str]], arrays: Mapping[str, str]) -> Iterat
 
 def _distinct(names: Sequence[str]) -> list[str]:
     """Return distinct names of members for components, whose names may have dots."""
-    found: list[str] = []
+    distinct: list[str] = []
     for name in names:
         text = in_c(re.sub(r"\W", "_", name, flags=re.ASCII))
         text = text if text[0].isalpha() else f"of_{text}"
-        while text in found or text in _TAKEN:
+        while text in distinct or text in _TAKEN:
             text += "_"
-        found.append(text)
-    return found
+        distinct.append(text)
+    return distinct
 
 
 #: Other members of the simulation.
