@@ -75,16 +75,15 @@ def sofirpy(job: Job) -> Result:
             }
         )
     logged = {name: job.outputs(name) for name in dict(job.wanted)}
-    begin = perf_counter()
     # The tool cuts off steps beyond the end, and rounding may put the last step there.
-    table = simulate(
+    table, seconds = _timed(
+        simulate,
         stop_time=(job.steps + 0.5) * job.step,
         step_size=job.step,
         fmu_paths={name: Path(path) for name, path in job.fmus.items()},
         connections_config=dict(connections),
         parameters_to_log=logged,
     )
-    seconds = perf_counter() - begin
     return table[[f"{name}.{port}" for name, port in job.wanted]].values.tolist()[1:], seconds
 
 
@@ -101,12 +100,10 @@ def syssimx(job: Job, algorithm: str = "JacobiAlgorithm") -> Result:
         system.add_connection(Connection(source, output, target, taking))
     system.set_algorithm(getattr(algorithms, algorithm)())
     system.initialize(t0=0.0)
-    begin = perf_counter()
-    result = system.run(t0=0.0, tf=job.steps * job.step, dt=job.step)
-    seconds = perf_counter() - begin
+    result, seconds = _timed(system.run, t0=0.0, tf=job.steps * job.step, dt=job.step)
     columns = [result[name][1][port] for name, port in job.wanted]
     # The tool adds up its time, and makes a tiny last step if the sum falls short of the end.
-    return [list(row) for row in zip(*columns, strict=True)][1 : job.steps + 1], seconds
+    return _rows(columns)[1 : job.steps + 1], seconds
 
 
 def syssimx_gauss_seidel(job: Job) -> Result:
@@ -137,12 +134,10 @@ def gemseo_fmu(job: Job) -> Result:
             )
         )
     system = TimeSteppingSystem(disciplines, job.steps * job.step, job.step)
-    begin = perf_counter()
-    data = system.execute()
-    seconds = perf_counter() - begin
+    data, seconds = _timed(system.execute)
     columns = [data[":".join(port)] for port in job.wanted]
     # This tool, too, may make a tiny last step.
-    return [[float(x) for x in row] for row in zip(*columns, strict=True)][: job.steps], seconds
+    return _rows(columns)[: job.steps], seconds
 
 
 def pathsim_fmi(job: Job) -> Result:
@@ -164,12 +159,10 @@ def pathsim_fmi(job: Job) -> Result:
         Connection(blocks[name][port], scope[i]) for i, (name, port) in enumerate(job.wanted)
     ]
     simulation = Simulation([*blocks.values(), scope], connections, dt=job.step, log=False)
-    begin = perf_counter()
-    simulation.run(job.steps * job.step)
-    seconds = perf_counter() - begin
+    _, seconds = _timed(simulation.run, job.steps * job.step)
     _, columns = scope.read()
     # The row at t is recorded after the step from t: its row at 0 is ours after the first step.
-    return [[float(x) for x in row] for row in zip(*columns, strict=True)][: job.steps], seconds
+    return _rows(columns)[: job.steps], seconds
 
 
 def cofmupy(job: Job) -> Result:
@@ -194,7 +187,7 @@ def cofmupy(job: Job) -> Result:
     seconds = perf_counter() - begin
     results = coordinator.get_results()
     columns = [results[port] for port in job.wanted]
-    return [[float(x) for x in row] for row in zip(*columns, strict=True)], seconds
+    return _rows(columns), seconds
 
 
 def sdf4sim(job: Job) -> Result:
@@ -254,10 +247,9 @@ def sdf4sim(job: Job) -> Result:
         sdf.Buffer(sdf.Src(*port), sink, deque())
         for port, sink in zip(job.wanted, sinks, strict=True)
     ]
-    begin = perf_counter()
-    results = sdf.sequential_run((agents, buffers), sdf.iterations_expired(job.steps))
-    seconds = perf_counter() - begin
-    return [list(row) for row in zip(*(results[sink] for sink in sinks), strict=True)], seconds
+    end = sdf.iterations_expired(job.steps)
+    results, seconds = _timed(sdf.sequential_run, (agents, buffers), end)
+    return _rows([results[sink] for sink in sinks]), seconds
 
 
 def pycosimlibrary(job: Job) -> Result:
@@ -287,11 +279,10 @@ def pycosimlibrary(job: Job) -> Result:
         stop_time=job.steps * job.step,
         print_interval=job.step,
     )
-    begin = perf_counter()
-    signals = JacobiRunner().run_cosim(scenario, None).out_signals
-    seconds = perf_counter() - begin
+    result, seconds = _timed(JacobiRunner().run_cosim, scenario, None)
+    signals = result.out_signals
     columns = [signals[name][loaded[name].vars[port].valueReference] for name, port in job.wanted]
-    return [list(row) for row in zip(*columns, strict=True)][1:], seconds
+    return _rows(columns)[1:], seconds
 
 
 class Slave(NamedTuple):
@@ -395,6 +386,17 @@ def _by_hand(job: Job, loaded: Callable[[str, str], Slave]) -> Result:
         give()
         rows.append([values[port] for port in job.wanted])
     return rows, perf_counter() - begin
+
+
+def _timed(run: Callable[..., Any], *arguments: Any, **options: Any) -> tuple[Any, float]:
+    """Call a function; return its result and the seconds that it took."""
+    begin = perf_counter()
+    result = run(*arguments, **options)
+    return result, perf_counter() - begin
+
+
+def _rows(columns: Sequence[Any]) -> list[list[float]]:
+    return [[float(value) for value in row] for row in zip(*columns, strict=True)]
 
 
 def write_rows(path: Path, rows: Rows, *seconds: float) -> None:

@@ -134,7 +134,7 @@ class HostVerdict:
         return self.deviation <= BOUND
 
 
-class Ran(NamedTuple):
+class HostRun(NamedTuple):
     """A run in a host.
 
     Attributes:
@@ -188,7 +188,7 @@ def _names(system: System, between: str = ".") -> list[str]:
 
 def _stepped(
     step: Callable[[], object], read: Callable[[], list[float]], experiment: Experiment
-) -> Ran:
+) -> HostRun:
     """Step a tool and read its outputs after each step, with separate times."""
     rows, seconds, reading = [], 0.0, 0.0
     for _ in range(experiment.rows - 1):
@@ -198,10 +198,10 @@ def _stepped(
         rows.append(read())
         seconds += stepped - start
         reading += perf_counter() - stepped
-    return Ran(np.array(rows), seconds, reading)
+    return HostRun(np.array(rows), seconds, reading)
 
 
-def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) -> Ran:
+def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) -> HostRun:
     from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
     from libcosimpy.CosimObserver import CosimObserver  # noqa: PLC0415
@@ -229,7 +229,7 @@ def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) 
     return _stepped(step, read, experiment)
 
 
-def libcosim_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
+def libcosim_ssp(system: System, experiment: Experiment, folder: Path) -> HostRun:
     check_choices(system, "libcosim")
     # libcosim and ecos read only the components of the outermost system of an SSP.
     system = system.flattened()
@@ -237,12 +237,12 @@ def libcosim_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
     return _libcosim(system, experiment, "from_ssp_file", ssp_path=str(path))
 
 
-def libcosim_osp(system: System, experiment: Experiment, folder: Path) -> Ran:
+def libcosim_osp(system: System, experiment: Experiment, folder: Path) -> HostRun:
     write_osp(system, folder)
     return _libcosim(system, experiment, "from_osp_config_file", osp_path=str(folder))
 
 
-def ecos(system: System, experiment: Experiment, folder: Path) -> Ran:
+def ecos(system: System, experiment: Experiment, folder: Path) -> HostRun:
     if experiment.start_time != 0.0:
         # ecos passes a start time to the FMUs, and still steps them from 0 s.
         raise InputError(f"ecos can start at 0 s only, not at {experiment.start_time:g} s")
@@ -277,7 +277,7 @@ def _ecos_simulation(ecospy: Any, system: System, experiment: Experiment, folder
     return ecospy.EcosSimulation(experiment.step, structure=structure)
 
 
-def fmpy_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
+def fmpy_ssp(system: System, experiment: Experiment, folder: Path) -> HostRun:
     check_parameters(system, "fmpy.ssp")
     [path] = write_ssp(system, folder)
     start_time, step = experiment.start_time, experiment.step
@@ -288,10 +288,10 @@ def fmpy_ssp(system: System, experiment: Experiment, folder: Path) -> Ran:
     seconds = perf_counter() - start
     # fmpy's row at a time holds the outputs of the step that begins then.
     rows = np.column_stack([table[name] for name in _names(system)])
-    return Ran(rows[: experiment.rows - 1], seconds)
+    return HostRun(rows[: experiment.rows - 1], seconds)
 
 
-_REST = "planner,plant+controller+disturbance"
+_PLANNER_FIRST = "planner,plant+controller+disturbance"
 
 #: Hosts by their names on the command line, those with pins last.
 HOSTS: dict[str, Host] = {
@@ -300,10 +300,12 @@ HOSTS: dict[str, Host] = {
     "ecos": Host("ecospy", ecos, _BOTH, turned=True),
     "fmpy": Host("fmpy", drivers.fmpy_slaves, _BOTH),
     "fmpy-ssp": Host("fmpy", fmpy_ssp, initial="zero"),
-    "cofmupy": Host("cofmupy", drivers.cofmupy, _BOTH, _REST, "zero", pins=["cofmupy==1.0.0"]),
+    "cofmupy": Host(
+        "cofmupy", drivers.cofmupy, _BOTH, _PLANNER_FIRST, "zero", pins=["cofmupy==1.0.0"]
+    ),
     "fmuloader": Host("fmuloader", drivers.fmuloader, _BOTH, pins=["fmuloader==0.1.2rc0"]),
     "gemseo-fmu": Host(
-        "gemseo-fmu", drivers.gemseo_fmu, _BOTH, _REST, "zero", pins=["gemseo-fmu==3.1.1"]
+        "gemseo-fmu", drivers.gemseo_fmu, _BOTH, _PLANNER_FIRST, "zero", pins=["gemseo-fmu==3.1.1"]
     ),
     "pathsim-fmi": Host(
         "pathsim-fmi",
@@ -391,7 +393,7 @@ def compare(
 
 def _run(
     host: Host, label: str, system: System, experiment: Experiment, hear: Callable[[str], None]
-) -> Ran:
+) -> HostRun:
     """Run a system in a host.
 
     Raises:
@@ -416,7 +418,7 @@ def _run(
             [seconds, reading], *rows = [[*map(float, line)] for line in csv.reader(lines)]
     if len(rows) != experiment.rows - 1:
         raise InputError(f"{len(rows)} rows instead of {experiment.rows - 1}")
-    return Ran(np.array(rows), seconds, reading)
+    return HostRun(np.array(rows), seconds, reading)
 
 
 def _process(
@@ -550,7 +552,7 @@ def _run_command(command: Sequence[str]) -> None:
 
 
 if __name__ == "__main__":
-    run: Callable[[System, Experiment, Path], Ran] = globals()[sys.argv[1]]
+    run: Callable[[System, Experiment, Path], HostRun] = globals()[sys.argv[1]]
     folder = Path(sys.argv[2])
     (folder / _EXPORT).mkdir()
     system, experiment = pickle.loads((folder / _GIVEN).read_bytes())
