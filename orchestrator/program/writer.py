@@ -413,15 +413,17 @@ class Equations:
             ]
         )
 
+    @property
+    def _parts(self) -> list[Kind | ReducerText]:
+        return [*self.kinds.values(), *self.reducers.values()]
+
     @cached_property
     def _structures(self) -> list[str]:
-        parts = (*self.kinds.values(), *self.reducers.values())
-        return [part.structure() for part in parts]
+        return [part.structure() for part in self._parts]
 
     @cached_property
     def _functions(self) -> list[str]:
-        parts = (*self.kinds.values(), *self.reducers.values())
-        return [text for part in parts for text in part.text()]
+        return [text for part in self._parts for text in part.text()]
 
 
 def head_of(equations: Equations) -> str:
@@ -537,6 +539,15 @@ class Text:
     def kind(self, component: str) -> Kind:
         """Return the kind of a component."""
         return self.kinds[self.definitions[component]]
+
+    @cached_property
+    def ports(self) -> Mapping[PortName, Port]:
+        """Ports of all components, as their authors declared them."""
+        return {
+            PortName(name, port.name): port
+            for name in self.components
+            for port in self.definitions[name].ports
+        }
 
     @cached_property
     def columns(self) -> dict[PortName, Place]:
@@ -834,15 +845,6 @@ class Text:
 
     def _refusal(self, name: str, call: str) -> str:
         return f"if (error->raised) return refused(it, {self.components.index(name)}, {call}, 0);"
-
-    @cached_property
-    def ports(self) -> Mapping[PortName, Port]:
-        """Ports of all components, as their authors declared them."""
-        return {
-            PortName(name, port.name): port
-            for name in self.components
-            for port in self.definitions[name].ports
-        }
 
     # Values along connections
 

@@ -48,7 +48,7 @@ export interface Shown {
 /** Half the angle of view [rad]. */
 const HALF = 0.3;
 
-/** Least length of the drawn vehicle: shares of the extents of the paths, and times ell. */
+/** Least length of the drawn vehicle: shares of the two largest extents, and a multiple of ell. */
 const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
 const LENGTH = 2;
