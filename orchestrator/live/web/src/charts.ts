@@ -237,9 +237,12 @@ class Chart {
     this.#lines = lines;
     this.#marks = marks;
     this.#named = named;
-    const isThere = lines.values.some((values) => values);
-    this.root.hidden = !isThere;
-    if (isThere && this.#visible) this.#redraw();
+    this.root.hidden = !lines.values.some((values) => values);
+    this.#redrawIfVisible();
+  }
+
+  #redrawIfVisible(): void {
+    if (this.#visible && !this.root.hidden) this.#redraw();
     else this.#stale = true;
   }
 
@@ -254,8 +257,7 @@ class Chart {
   /** Lets the chart begin at another time [s], so that small values can be seen after large ones. */
   begin(from: number): void {
     this.#from = from;
-    if (this.#visible && !this.root.hidden) this.#redraw();
-    else this.#stale = true;
+    this.#redrawIfVisible();
   }
 
   /** Draws again with other colours. */

@@ -7,7 +7,6 @@ import type {
   Data,
   EventData,
   LoopData,
-  Metrics,
   Occurrence,
   Options,
   Parameter,
@@ -225,23 +224,22 @@ export class Engine {
       agendaOf(events, layout),
       loop.measured.map((place) => this.reducers(place, layout, numbers, loop.actingRow)),
     );
-    if (found.rows === 0 && found.outcome === "refused")
-      throw new Refusal(whyRefused(found.refused, loop));
+    const refusal = found.outcome === "refused" ? whyRefused(found.refused, loop) : "";
+    if (refusal && found.rows === 0) throw new Refusal(refusal);
     const happened = occurrences(events, found.happened, experiment);
     const last = `t = ${general(experiment.time(found.refused.made), 12)} s`;
-    return new Table(
-      loop.actingRow,
-      layout,
-      copied(found.table, spare),
+    return {
+      ...rowsOf(layout, copied(found.table, spare)),
+      actingRow: loop.actingRow,
       parameters,
       happened,
-      found.metrics,
-      messages(loop, found.restarts),
-      found.outcome === "refused"
-        ? `stopped at ${last}: ${whyRefused(found.refused, loop)}`
-        : undefined,
-      found.outcome === "ended" ? `ended at ${last}: ${whyEnded(events, happened)}` : undefined,
-    );
+      metrics: found.metrics,
+      messages: messages(loop, found.restarts),
+      ...(refusal && { failure: `stopped at ${last}: ${refusal}` }),
+      ...(found.outcome === "ended" && {
+        remark: `ended at ${last}: ${whyEnded(events, happened)}`,
+      }),
+    };
   }
 
   /** Returns the reducers of a vehicle's indices. */
@@ -353,51 +351,21 @@ function copied(rows: Float64Array, spare: Result | undefined): Float64Array {
   return table;
 }
 
-/** Rows of a run. */
-class Table implements Result {
-  readonly columns: readonly string[];
-  readonly faults: ReadonlyMap<number, string>;
-  readonly rows: number;
-  private readonly places: ReadonlyMap<string, number>;
-  private readonly made = new Map<string, Float64Array>();
-  readonly failure?: string;
-  readonly remark?: string;
-
-  constructor(
-    readonly actingRow: number,
-    layout: Layout,
-    readonly table: Float64Array,
-    readonly parameters: Values,
-    readonly happened: readonly Occurrence[],
-    readonly metrics: readonly Metrics[],
-    readonly messages: readonly string[],
-    failure: string | undefined,
-    remark: string | undefined,
-  ) {
-    this.columns = layout.names;
-    this.faults = layout.faults;
-    this.rows = table.length / (1 + this.columns.length);
-    this.places = layout.columns;
-    if (failure !== undefined) this.failure = failure;
-    if (remark !== undefined) this.remark = remark;
-  }
-
-  get time(): Float64Array {
-    return this.column("time");
-  }
-
-  has(name: string): boolean {
-    return this.places.has(name);
-  }
-
-  column(name: string): Float64Array {
-    const known = this.made.get(name);
+/** Returns the columns of a table of rows; a column is copied when it is first read. */
+function rowsOf({ names, faults, columns }: Layout, table: Float64Array) {
+  const width = 1 + names.length;
+  const rows = table.length / width;
+  const copies = new Map<string, Float64Array>();
+  const column = (name: string) => {
+    const known = copies.get(name);
     if (known !== undefined) return known;
-    const place = name === "time" ? 0 : 1 + (this.places.get(name) ?? Number.NaN);
+    const place = name === "time" ? 0 : 1 + (columns.get(name) ?? Number.NaN);
     if (Number.isNaN(place)) throw new Error(`there is no column ${name}`);
-    const [width, column] = [1 + this.columns.length, new Float64Array(this.rows)];
-    for (let k = 0; k < this.rows; k++) column[k] = this.table[k * width + place];
-    this.made.set(name, column);
-    return column;
-  }
+    const values = new Float64Array(rows);
+    for (let k = 0; k < rows; k++) values[k] = table[k * width + place];
+    copies.set(name, values);
+    return values;
+  };
+  const has = (name: string) => columns.has(name);
+  return { columns: names, faults, rows, table, time: column("time"), has, column };
 }
