@@ -27,7 +27,6 @@ from orchestrator.exchange.hosts import BOUND, HOSTS, compare, fmi_of
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.machine.errors import InputError, listed
-from orchestrator.program.components import definitions_of
 from orchestrator.program.files import ProgramFiles, write_files
 from orchestrator.program.fmu import SystemModel, write_fmu
 from orchestrator.runs.folder import replace_files
@@ -230,16 +229,12 @@ def _export(options: argparse.Namespace) -> int:
     folder = options.out or Path("exports", prepared.scenario.stem)
     with replace_files(folder, force=options.force) as unfinished:
         if options.format == FMU:
-            definitions = definitions_of(system)
-            model = SystemModel(
-                prepared.plan, definitions, system.name, prepared.scenario.title or system.name
-            )
+            title = prepared.scenario.title or system.name
+            model = SystemModel(prepared.plan, system.name, title)
             written = write_fmu(model, unfinished, options.fmi, options.platforms, say)
         elif options.format == C:
             title = prepared.scenario.title or system.name
-            program = ProgramFiles(
-                prepared.plan, definitions_of(system), prepared.scenario.stem, title, options.single
-            )
+            program = ProgramFiles(prepared.plan, prepared.scenario.stem, title, options.single)
             written = write_files(program, unfinished)
         elif options.format == OSP:
             written = write_osp(system, unfinished)

@@ -107,10 +107,10 @@ def _own(component: Component, origin: Origin) -> Definition:
         raise InputError(
             f"{script.name} is a slave of PythonFMU, and not in the language of equations"
         )
-    return define(name_of(script.stem), load(script))
+    return define(name_of(script.stem), _load(script))
 
 
-def load(script: Path) -> ModuleType:
+def _load(script: Path) -> ModuleType:
     """Load a user's module from its source, with the modules in its folder that it imports.
 
     Raises:

@@ -19,9 +19,9 @@ from fmus.language.types import FLOAT, count
 from fmus.native.emit import closed, number_in_c, quoted
 from fmus.native.pieces import array, function
 from fmus.native.translator import deepest
-from fmus.ports.definition import Definition
 from orchestrator.cosim import Plan, PortName
 from orchestrator.machine.errors import InputError
+from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import CALLS, Text, Unsupported, head_of
 
 #: Descriptions of the calls that a component can refuse.
@@ -259,7 +259,6 @@ class ProgramFiles:
 
     Attributes:
         plan: plan of the run.
-        definitions: definitions of the components, by component.
         name: name of the files, and prefix of all public names.
         title: one line about the system.
         is_single: if set, numbers have single precision.
@@ -267,7 +266,6 @@ class ProgramFiles:
     """
 
     plan: Plan
-    definitions: Mapping[str, Definition]
     name: str
     title: str
     is_single: bool = False
@@ -279,7 +277,7 @@ class ProgramFiles:
             InputError: the system cannot be one program, with the reason.
 
         """
-        self.text = Text(self.plan, self.definitions)
+        self.text = Text(self.plan, definitions_of(self.plan.system))
         self.name = re.sub(r"\W", "_", self.name, flags=re.ASCII)
         self.name = self.name if self.name[0].isalpha() else f"of_{self.name}"
         self._upper = self.name.upper()
@@ -324,7 +322,7 @@ class ProgramFiles:
 
     def _header(self) -> str:
         experiment, text = self.plan.experiment, self.text
-        summaries = (f"{name}: {self.definitions[name].summary}" for name in text.components)
+        summaries = (f"{name}: {text.definitions[name].summary}" for name in text.components)
         members = self._constants("COMPONENT", text.components)
         columns = dict(
             zip(self._columns.values(), ["", *map(self._about, text.columns)], strict=True)

@@ -32,7 +32,7 @@ from fmus.native.packaging import Parts, entries_of
 from fmus.native.pieces import array, function, structure
 from fmus.native.tables import places_of, port_tables
 from fmus.native.translator import constants, defined
-from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, check_enumerations
+from fmus.ports.definition import DefaultExperiment, Model, Origin, check_enumerations
 from fmus.ports.description_fmi3 import terminals_of
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
@@ -41,6 +41,7 @@ from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.file_names import file_name
 from orchestrator.machine.platforms import platforms as platforms_of
+from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import Text, Unsupported
 
 _NOISE = """\
@@ -232,14 +233,11 @@ class SystemModel:
 
     """
 
-    def __init__(
-        self, plan: Plan, definitions: Mapping[str, Definition], name: str, title: str
-    ) -> None:
+    def __init__(self, plan: Plan, name: str, title: str) -> None:
         """Translate the system of a plan.
 
         Args:
             plan: plan of the FMU's run.
-            definitions: definitions of the components, by component.
             name: name of the model.
             title: one line about the system.
 
@@ -247,8 +245,9 @@ class SystemModel:
             InputError: the system cannot be one FMU, with the reason.
 
         """
-        self.text, self.name = Text(plan, definitions, is_tuned=True, is_hosted=True), name
-        self.plan, self._definitions, self._title = self.text.plan, definitions, title
+        definitions = definitions_of(plan.system)
+        self.text = Text(plan, definitions, is_tuned=True, is_hosted=True)
+        self.plan, self.name, self._title = self.text.plan, name, title
         fed = {connection.target for connection in self.plan.system.connections}
         #: Unconnected inputs.
         self._open = [
@@ -313,7 +312,7 @@ class SystemModel:
         default = DefaultExperiment(
             experiment.stop_time, experiment.step, experiment.start_time, not self.text.slow
         )
-        origins = [each.origin for each in dict.fromkeys(self._definitions.values())]
+        origins = [each.origin for each in dict.fromkeys(self.text.definitions.values())]
         texts = (
             "; ".join(dict.fromkeys(filter(None, (getattr(origin, field) for origin in origins))))
             for field in Origin._fields
@@ -327,7 +326,7 @@ class SystemModel:
         system, model = self.plan.system, self.model
         places = {H_MAX: "PARAMETER_AT(h_max)"}
         for name, member in self.text.members.items():
-            of_one = places_of(self._definitions[name], f"model.{member}")
+            of_one = places_of(self.text.definitions[name], f"model.{member}")
             if self.text.kind(name).has_h_max:
                 of_one[H_MAX] = f"PARAMETER_AT(model.{self._longest(member)})"
             places |= {str(PortName(name, port)): place for port, place in of_one.items()}
@@ -335,13 +334,13 @@ class SystemModel:
         groups = {
             f"{name}.": [
                 port
-                for port in self._definitions[name].ports
+                for port in self.text.definitions[name].ports
                 if port.causality != "input" or PortName(name, port.name) in self._open
             ]
             for name in system.components
         }
         rows = "\n".join(
-            f"- `{name}`: {self._definitions[name].name}, {self._definitions[name].summary}"
+            f"- `{name}`: {self.text.definitions[name].name}, {self.text.definitions[name].summary}"
             for name in system.components
         )
         steps = _FIXED.format(slow=", ".join(sorted(self.text.slow))) if self.text.slow else _SPLIT
