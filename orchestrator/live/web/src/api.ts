@@ -18,7 +18,7 @@ export interface Api {
 }
 
 /** Owner of the settings: the page, or a plain object without a page. */
-export interface Keeper {
+interface Keeper {
   readonly settings: Settings;
   apply(settings: Settings): void;
 }

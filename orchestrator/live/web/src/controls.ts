@@ -9,7 +9,7 @@ import type { Parameter, Preset, Value, Values, VehicleData } from "./types";
 export type Changed = (values: Changes) => void;
 
 /** Describes a parameter: its meaning, range and value in the preset. */
-export function explained(parameter: Parameter): string {
+function explained(parameter: Parameter): string {
   const { name, description, unit, min, max, value, choices } = parameter;
   const range = [
     min === undefined ? "" : `at least ${min}`,
@@ -26,7 +26,7 @@ export function explained(parameter: Parameter): string {
 }
 
 /** A field for one parameter. */
-export class Field {
+class Field {
   readonly element: HTMLInputElement | HTMLSelectElement;
   readonly parameter: Parameter;
   /** Last argument of `show`; null: the user has changed the field since. */
@@ -95,7 +95,7 @@ export class Field {
 }
 
 /** A slider that sets one or several parameters together, and a field for each. */
-export class SliderRow {
+class SliderRow {
   readonly root: HTMLElement;
   readonly fields: readonly Field[];
   readonly #row: Slider;

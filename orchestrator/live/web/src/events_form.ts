@@ -7,7 +7,7 @@ import { entered } from "./text";
 import type { EventData, Preset } from "./types";
 
 /** Calls for the user's choices: another set of events, or a changed event. */
-export interface Wishes {
+interface Wishes {
   take(events: string): void;
   edit(number: number, edit: Edit): void;
 }

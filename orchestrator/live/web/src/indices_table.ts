@@ -6,7 +6,7 @@ import { fourDigits } from "./text";
 import type { IndexData, Metrics } from "./types";
 
 /** A controller in the table. */
-export interface Measured {
+interface Measured {
   readonly label: string;
   /** Its number among the controllers, for its colour. */
   readonly place: number;

@@ -100,7 +100,7 @@ export function longest(results: readonly (Run | undefined)[]): Run | undefined 
 }
 
 /** The vehicles of a loop, and the chosen one. */
-export interface Chosen {
+interface Chosen {
   readonly vehicle: VehicleData;
   readonly fleet: readonly VehicleData[];
 }

@@ -4,7 +4,7 @@ import type { Mark } from "./charts";
 import { general } from "./text";
 
 /** Elements of the bar below the scene. */
-export interface Bar {
+interface Bar {
   toggle: HTMLButtonElement;
   slider: HTMLInputElement;
   output: HTMLOutputElement;

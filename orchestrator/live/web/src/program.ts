@@ -18,11 +18,11 @@ export interface Refused {
 
 /** Calls that a component may refuse, in the order of their numbers. */
 const CALLS = ["start", "input", "outputs", "step", "set"] as const;
-export type Call = (typeof CALLS)[number];
+type Call = (typeof CALLS)[number];
 
 /** Outcomes of a run, in the order of their numbers. */
 const OUTCOMES = ["whole", "refused", "ended"] as const;
-export type Outcome = (typeof OUTCOMES)[number];
+type Outcome = (typeof OUTCOMES)[number];
 
 /** Steps and times of a run. */
 export interface Times {

@@ -29,7 +29,7 @@ export interface Track {
 }
 
 /** Content of a scene. */
-export interface Shown {
+interface Shown {
   /** Tracks of all vehicles, by controller; empty: the controller is hidden. */
   tracks: readonly (readonly Track[])[];
   /** References of the vehicles; undefined: no reference. */

@@ -84,7 +84,7 @@ const KINDS = ["override", "bias", "freeze", "release", "set", "reset", "stop"];
 const COMPARISONS = ["<", "<=", ">", ">="];
 
 /** Numbers of the columns, inputs, parameters and components of a loop, by name. */
-export interface Places {
+interface Places {
   readonly columns: ReadonlyMap<string, number>;
   readonly inputs: ReadonlyMap<string, number>;
   readonly parameters: ReadonlyMap<string, number>;
@@ -135,7 +135,7 @@ function actionsOf(action: Action, { inputs, parameters, components }: Places): 
 }
 
 /** Returns events as numbers, in the order in which they act at the same time. */
-export function agendaOf(events: readonly EventData[], places: Places): Agenda {
+function agendaOf(events: readonly EventData[], places: Places): Agenda {
   const rows = new Float64Array(events.length * EVENT);
   const actions: number[] = [];
   events.forEach(({ at, when, repeat, lasts, label, action }, i) => {
@@ -176,7 +176,7 @@ export function occurrences(
 }
 
 /** Returns why an event has ended a run. */
-export function whyEnded(events: readonly EventData[], happened: readonly Occurrence[]): string {
+function whyEnded(events: readonly EventData[], happened: readonly Occurrence[]): string {
   const { action } = events[happened[happened.length - 1].event];
   return action.kind === "stop" ? action.why : "";
 }

@@ -6,7 +6,7 @@ import type { VehicleData } from "./types";
 export const POSITIONS = 1000;
 
 /** A range of values, linear or logarithmic; if `zero` is set, its first position is zero. */
-export interface Scale {
+interface Scale {
   readonly low: number;
   readonly high: number;
   readonly log?: boolean;
@@ -26,7 +26,7 @@ export interface Slider {
   readonly scale: Scale;
 }
 
-export interface Group {
+interface Group {
   readonly title: string;
   readonly open?: boolean;
   readonly rows: readonly Slider[];

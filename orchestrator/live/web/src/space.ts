@@ -124,14 +124,14 @@ export interface Label {
   isTitle: boolean;
 }
 
-export interface Grid {
+interface Grid {
   /** Ends of lines, one after another. */
   lines: number[];
   labels: Label[];
 }
 
 /** An axis of the scene. */
-export interface Axis {
+interface Axis {
   title: string;
   /** If set, its numbers decrease. */
   reversed: boolean;

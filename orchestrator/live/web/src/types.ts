@@ -6,7 +6,7 @@ export type Value = number | boolean | string;
 /** Values by `component.parameter`. */
 export type Values = Readonly<Record<string, Value>>;
 
-export type FmiType = "Real" | "Integer" | "Boolean" | "Enumeration";
+type FmiType = "Real" | "Integer" | "Boolean" | "Enumeration";
 
 /** A parameter or unconnected input that a user may change. */
 export interface Parameter {
@@ -27,7 +27,7 @@ export interface Parameter {
 }
 
 /** Pairs of port and value. */
-export type Assignments = readonly (readonly [string, Value])[];
+type Assignments = readonly (readonly [string, Value])[];
 
 /** Action of an event; names are `component.port`. */
 export type Action =
@@ -39,7 +39,7 @@ export type Action =
   | { readonly kind: "stop"; readonly why: string };
 
 /** A signal compared with a number. */
-export interface Condition {
+interface Condition {
   readonly signal: string;
   readonly comparison: "<" | "<=" | ">" | ">=";
   readonly value: number;
