@@ -92,6 +92,7 @@ class Kind:
         derived_from = ("state", "inputs", "t")
         self.derives_anew = any(behaviour.takes("derive", name) for name in derived_from)
         self.steps = behaviour.hooks["update"] is not None
+        self.is_guarded = behaviour.hooks["credible"] is not None
         self.has_h_max = behaviour.h_max is not None
 
     @cached_property
@@ -159,7 +160,7 @@ class Kind:
             rows.append("double longest_step; /* longer ones are split [s] */")
         if self.is_timed:
             rows.append("double time; /* of the state [s] */")
-        if self.tells:
+        if self.keeps_restart:
             rows.append("double restarted; /* time at which a guard first reset the state [s] */")
             rows.append("int has_restarted;")
         if self.behaviour.draws:
@@ -177,17 +178,17 @@ class Kind:
         return ["if (it->underived) {", f"    {derived}", "    it->underived = error->raised;", "}"]
 
     @property
-    def tells(self) -> bool:
+    def keeps_restart(self) -> bool:
         """True if it keeps the time at which a guard first reset its state."""
-        return self.is_tuned and self.behaviour.hooks["credible"] is not None
+        return self.is_tuned and self.is_guarded
 
-    def _guarded(self, *, tells: bool = False) -> list[str]:
+    def _guarded(self, *, keeps_restart: bool = False) -> list[str]:
         """Return statements that copy the state, and reset it if a guard says so."""
         lines = [f"{self._type('state')} state = it->state;"]
-        if self.behaviour.hooks["credible"]:
+        if self.is_guarded:
             lines.append(f"if (!{self.call('credible', state='state')}) {{")
             lines.append(f"    state = {self.call('restarted', state='state')};")
-            if tells:
+            if keeps_restart:
                 lines.append("    if (!it->has_restarted) it->restarted = t;")
                 lines.append("    it->has_restarted = 1;")
             lines.append("}")
@@ -195,8 +196,7 @@ class Kind:
 
     def _computed(self) -> list[str]:
         """Return statements that compute the outputs."""
-        is_guarded = self.behaviour.hooks["credible"] is not None
-        lines, state = self._guarded() * is_guarded, "state" if is_guarded else "it->state"
+        lines, state = (self._guarded(), "state") if self.is_guarded else ([], "it->state")
         if self.behaviour.takes("outputs", "derived"):
             lines += self._derive(state, "it->time")
         lines.append(f"{self._type('outputs')} outputs = {self.call('outputs', state=state)};")
@@ -313,7 +313,7 @@ class Kind:
         if self.steps:
             split = self.emitter.call(self.euler["internal_steps"], ["h", "it->longest_step"])
             lines += [
-                *self._guarded(tells=self.tells),
+                *self._guarded(keeps_restart=self.keeps_restart),
                 "int n = 1;",
                 "if (h > it->longest_step) {",
                 f"    if (h / it->longest_step > {float(euler.MOST_INTERNAL_STEPS)!r}) {{",

@@ -1210,7 +1210,7 @@ class Text:
     def _restarts(self) -> str:
         rows = (
             f"    times[{i}] = it->{member}.has_restarted ? it->{member}.restarted : -1.0;\n"
-            if self.kind(name).tells
+            if self.kind(name).keeps_restart
             else f"    times[{i}] = -1.0;\n"
             for i, (name, member) in enumerate(self.members.items())
         )

@@ -6,7 +6,7 @@ import { GROUPS, POSITIONS, positionOf, type Slider, sliderOf, valueAt } from ".
 import { entered } from "./text";
 import type { Parameter, Preset, Value, Values, VehicleData } from "./types";
 
-export type Changed = (values: Changes) => void;
+type Changed = (values: Changes) => void;
 
 /** Describes a parameter: its meaning, range and value in the preset. */
 function explained(parameter: Parameter): string {
