@@ -17,17 +17,10 @@ from typing import Any, NamedTuple
 from fmus.kinds import NATIVE
 from orchestrator.cosim import (
     Action,
-    Alter,
     Component,
     Event,
-    Freeze,
     PortName,
-    Release,
-    Reset,
-    Set,
-    Stop,
     System,
-    Value,
 )
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.live.assembly import Plain, assemble, vehicle_data
@@ -396,22 +389,13 @@ def _event(number: int, event: Event) -> Plain:
 
 
 def _action(action: Action) -> Plain:
-    match action:
-        case Alter(effect, values):
-            return {"kind": "alter", "effect": effect, "values": _assigned(values)}
-        case Freeze(targets):
-            return {"kind": "freeze", "targets": list(map(str, targets))}
-        case Release(targets):
-            return {"kind": "release", "targets": list(map(str, targets))}
-        case Set(parameters, inputs):
-            given = {"parameters": _assigned(parameters), "inputs": _assigned(inputs)}
-            return {"kind": "set", **given}
-        case Reset(components):
-            return {"kind": "reset", "components": list(components)}
-        case Stop(why):
-            return {"kind": "stop", "why": why}
-    raise TypeError(f"the page does not know the event {action!r}")
+    """Return an action with the names of its fields, and its class as `kind`."""
+    fields = {name: _plain(value) for name, value in vars(action).items()}
+    return {"kind": type(action).__name__.lower(), **fields}
 
 
-def _assigned(values: Sequence[tuple[PortName, Value]]) -> list[list[Value]]:
-    return [[str(target), value] for target, value in values]
+def _plain(value: Any) -> Any:
+    """Convert names of ports to text, and tuples to lists."""
+    if isinstance(value, PortName):
+        return str(value)
+    return list(map(_plain, value)) if isinstance(value, tuple) else value
