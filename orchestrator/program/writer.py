@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain
 from pathlib import Path
+from textwrap import wrap
 from typing import Any, NamedTuple
 
 from auv_fmu.paper import euler
@@ -176,14 +177,9 @@ static int refused(simulation *it, int component, int call, int port) {
 _GUARD = re.compile(r"^#ifndef (\w+_[CH])\n#define \1\n|\n#endif\n\Z", re.MULTILINE)
 
 _BEGIN = """\
-/* Sets parameters and settles values at the start. Returns 1 if a component refuses. */
 EXPORTED int begin(simulation *it, const double parameters[], double start_time, double step,
                    double stop_time, int full_steps, int steps)"""
 
-_RUN = """\
-/* Makes steps up to number `until`, and rows unless `rows` is NULL. Returns 1 if a component
- * refuses. */
-EXPORTED int run(simulation *it, int until, double rows[])"""
 
 _ACCESS = """\
 EXPORTED size_t size_of_simulation(void) { return sizeof(simulation); }
@@ -656,7 +652,7 @@ class Text:
 
     def _own(self) -> list[str]:
         # Writing these adds to the mappings.
-        simulation, rest, steps = self._simulation(), self._rest(), self._steps()
+        simulation, rest, steps = self._simulation(), self._settling(), self._steps()
         mappings = (head + body for body, head in self._mappings.items())
         return [simulation, _TIMES, *mappings, rest, *steps]
 
@@ -724,7 +720,8 @@ class Text:
             *self.unsplit(),
             "return come_to_rest(it, &noted) != 0;",
         ]
-        return function(_BEGIN, lines, ())
+        doc = "Sets parameters and settles values at the start. Returns 1 if a component refuses."
+        return _function(doc, _BEGIN, lines, ())
 
     def unsplit(self) -> Iterator[str]:
         """Yield statements that set the longest step that each component does not split."""
@@ -735,7 +732,7 @@ class Text:
             elif kind.steps:
                 yield f"{place} = DBL_MAX;"
 
-    def _rest(self) -> str:
+    def _settling(self) -> str:
         """Return the functions that settle values at the start."""
         system = self.plan.system
         order = [name for names in self.plan.arrangement.settling for name in names]
@@ -758,7 +755,7 @@ class Text:
             ]
             passed += [
                 f"if (feed_{i}(it, it, error)) {{",
-                *map("    {}".format, self._anew(name)),
+                *map("    {}".format, self._evaluated_again(name)),
                 "}",
             ]
         starts = []
@@ -781,30 +778,27 @@ class Text:
             *(["if (changed == 1) return hand_on(it, error) ? -1 : 0;"] if early else []),
             "return changed;",
         ]  # fmt: skip
-        handed_on = function(
-            "static int hand_on(simulation *it, Error *error)", [*passed, "return 0;"]
+        settle = _function(
+            "Passes values along all connections once. Returns the bitwise or of all results of "
+            "`take`, or -1 if a component refuses.",
+            "static int settle(simulation *it, int everything, Error *error)",
+            [*settled, "return changed;"],
         )
-        doc = "/* Passes values on after the start. Returns 1 if a component refuses. */"
-        return "\n\n".join(
-            (
-                *(part for name in self.components for part in self._fed(name)),
-                "/* Passes values along all connections once. Returns the bitwise or of all\n"
-                " * results of `take`, or -1 if a component refuses. */\n"
-                + function(
-                    "static int settle(simulation *it, int everything, Error *error)",
-                    [*settled, "return changed;"],
-                ),
-                *([f"{doc}\n{handed_on}"] if early else []),
-                "/* Settles values at the start. Returns 0, 3 if they do not come to rest, or -1\n"
-                " * if a component refuses. */\n"
-                + function(
-                    "static int come_to_rest(simulation *it, Error *error)",
-                    lines,
-                ),
-            )
+        hand_on = _function(
+            "Passes values on after the start. Returns 1 if a component refuses.",
+            "static int hand_on(simulation *it, Error *error)",
+            [*passed, "return 0;"],
         )
+        come_to_rest = _function(
+            "Settles values at the start. Returns 0, 3 if they do not come to rest, or -1 if a "
+            "component refuses.",
+            "static int come_to_rest(simulation *it, Error *error)",
+            lines,
+        )
+        feeding = (part for name in self.components for part in self._feeding_and_start(name))
+        return "\n\n".join([*feeding, settle, *([hand_on] if early else []), come_to_rest])
 
-    def _fed(self, name: str) -> Iterator[str]:
+    def _feeding_and_start(self, name: str) -> Iterator[str]:
         """Yield the functions that feed and start a component."""
         i, taken = self.components.index(name), list[str]()
         member = f"it->{self.members[name]}"
@@ -812,15 +806,14 @@ class Text:
             target = self.columns[connection.target]
             take = "take" if target.type == FLOAT else "take_whole"
             taken.append(f"is_other |= {take}(&{target.text}, {self.value(connection, 'now')});")
-        yield (
-            f"/* Passes the current values to {closed(name)}. Returns nonzero if any changes. */\n"
-            + function(
-                f"static int feed_{i}(simulation *it, const simulation *now, Error *error)",
-                ["int is_other = 0;", *taken, "return is_other;"],
-                ("it", "now", "error"),
-            )
+        yield _function(
+            f"Passes the current values to {closed(name)}. Returns nonzero if any changes.",
+            f"static int feed_{i}(simulation *it, const simulation *now, Error *error)",
+            ["int is_other = 0;", *taken, "return is_other;"],
+            ("it", "now", "error"),
         )
-        yield "/* Starts it. Returns 1 if it refuses. */\n" + function(
+        yield _function(
+            "Starts it. Returns 1 if it refuses.",
             f"static int start_{i}(simulation *it, double t, Error *error)",
             [
                 *self.checked_inputs(name),
@@ -832,7 +825,7 @@ class Text:
             ],
         )
 
-    def _anew(self, name: str) -> Iterator[str]:
+    def _evaluated_again(self, name: str) -> Iterator[str]:
         """Yield statements that compute the outputs after other inputs at the start."""
         kind, member = self.kind(name), f"it->{self.members[name]}"
         yield from self.checked_inputs(name)
@@ -912,7 +905,8 @@ class Text:
     def show(self) -> str:
         """Return the function that writes a row."""
         values = [(f"row[{i}]", place.text) for i, place in enumerate(self.columns.values(), 1)]
-        return "/* A row: the time, and all inputs and outputs. */\n" + function(
+        return _function(
+            "Writes a row: the time, and all inputs and outputs.",
             "static void show(const simulation *it, double t, double row[])",
             ["row[0] = t;", *_copies(values)],
             (),
@@ -943,20 +937,25 @@ class Text:
             ]
             n += sum(map(len, reducer.results.values()))
         lines.append("it->looked = t;")
+        give_lines = [
+            "Error noted = {0}, *error = &noted;",
+            "int raised = 0;",
+            *gives,
+            "return raised + noted.raised;",
+        ]
         return [
-            "/* Passes the current row to the indices. */\n"
-            + function("static void look(simulation *it, double t)", lines, ()),
-            f"enum {{ INDICES = {n} }};\n\n"
-            "/* Gives the indices of the rows so far, NaN for missing ones. Returns how many have\n"
-            " * raised an error. */\n"
-            + function(
+            _function(
+                "Passes the current row to the indices.",
+                "static void look(simulation *it, double t)",
+                lines,
+                (),
+            ),
+            f"enum {{ INDICES = {n} }};",
+            _function(
+                "Gives the indices of the rows so far, NaN for missing ones. Returns how many have "
+                "raised an error.",
                 "EXPORTED int indices(const simulation *it, double found[])",
-                [
-                    "Error noted = {0}, *error = &noted;",
-                    "int raised = 0;",
-                    *gives,
-                    "return raised + noted.raised;",
-                ],
+                give_lines,
                 (),
             ),
         ]
@@ -970,7 +969,8 @@ class Text:
 
     def _run(self) -> Iterator[str]:
         looks = ["look(it, t);"] * bool(self.indices)
-        yield "/* Writes the row after k steps, and passes it to the indices. */\n" + function(
+        yield _function(
+            "Writes the row after k steps, and passes it to the indices.",
             "static void keep(simulation *it, int k, double rows[])",
             [
                 "const double t = time_after(it, k);",
@@ -1006,12 +1006,18 @@ class Text:
                 "}",
             ]
         # Checks at the beginning of a step cover the values of the step before.
-        yield function(_RUN, [*lines, *self._unsound(), "return 0;"], ())
+        yield _function(
+            "Makes steps up to number `until`, and rows unless `rows` is NULL. Returns 1 if a "
+            "component refuses.",
+            "EXPORTED int run(simulation *it, int until, double rows[])",
+            [*lines, *self._unsound(), "return 0;"],
+            (),
+        )
 
     def _steps(self) -> list[str]:
         passing, parts = self.stages.passing, []
         if passing is not None:
-            parts.append(self._made("pass", "Passes values of t_k on", passing, ()))
+            parts.append(self._step_function("pass", "Passes values of t_k on", passing, ()))
         end = self._end("it->start_time")
         begin = ["const double h = length_of(it, k, 1);"]
         if not self.is_hosted:
@@ -1023,7 +1029,7 @@ class Text:
         doc = "Makes the step after the k-th"
         if self.is_quick:
             parts.append(self._sound())
-        parts.append(self._made("make_step", doc, self.stages.stepping, begin))
+        parts.append(self._step_function("make_step", doc, self.stages.stepping, begin))
         return parts
 
     def _unsound(self) -> list[str]:
@@ -1043,12 +1049,15 @@ class Text:
             tests += filter(None, [kind.are_finite(f"it->{member}.outputs")])
             tests += filter(None, [kind.is_sound(f"it->{member}.state")] * kind.steps)
         lines = [f"int is_sound = {tests[0]};", *(f"is_sound &= {test};" for test in tests[1:])]
-        return "/* True if all outputs and states are sound. */\n" + function(
+        return _function(
+            "Tells whether all outputs and states are sound.",
             "static inline int is_sound(const simulation *it, const Error *error)",
             [*lines, "return is_sound;"],
         )
 
-    def _made(self, name: str, doc: str, stages: Sequence[Stage], begin: Sequence[str]) -> str:
+    def _step_function(
+        self, name: str, doc: str, stages: Sequence[Stage], begin: Sequence[str]
+    ) -> str:
         lines = [*begin]
         for stage in stages:
             inner = list(self._stage(stage))
@@ -1061,7 +1070,8 @@ class Text:
         if stages is self.stages.stepping and stages[-1].decimation is not None:
             # The last stage, which checks the values, is not part of every step.
             lines += self._unsound()
-        return f"/* {doc}. Returns 1 if a component refuses. */\n" + function(
+        return _function(
+            f"{doc}. Returns 1 if a component refuses.",
             f"static int {name}(simulation *it, int k, double t, Error *error)",
             [*lines, "return 0;"],
             ("k", "t", "error", *(("h", "end") if begin else ())),
@@ -1219,6 +1229,14 @@ class Text:
             "EXPORTED void restarts(const simulation *it, double times[]) {\n"
             f"    (void)it;\n{''.join(rows)}}}"
         )
+
+
+def _function(
+    doc: str, head: str, lines: Sequence[str], arguments: Sequence[str] = ("error",)
+) -> str:
+    """Return a C function with a comment; arguments that it does not use are marked so."""
+    comment = "\n * ".join(wrap(doc, 94))
+    return f"/* {comment} */\n{function(head, lines, arguments)}"
 
 
 def _number(place: Place) -> str:
