@@ -29,7 +29,7 @@ from measuring import options, python, steps_time, timed
 from auv_fmu.loop.closed_loop import closed_loop
 from auv_fmu.paper.euler import STEP
 from orchestrator.cosim import System
-from orchestrator.exchange.hosts.comparison import HOSTS, compare
+from orchestrator.exchange.hosts import HOSTS, compare
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.wiring import closed_loop as wired
 

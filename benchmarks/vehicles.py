@@ -26,7 +26,7 @@ import numpy as np
 from auv_fmu.paper.euler import STEP
 from fmus.kinds import NATIVE, PYTHON, KindName
 from orchestrator.cosim import Ending, Header, Plan
-from orchestrator.exchange.hosts.comparison import compare
+from orchestrator.exchange.hosts import compare
 from orchestrator.runs.preparation import load, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario

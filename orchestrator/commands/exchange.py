@@ -23,12 +23,10 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import FAILED, OK, describe, say, show
 from orchestrator.cosim import Exchange, Experiment, write_osp, write_ssp
 from orchestrator.exchange.carried import Carried
-from orchestrator.exchange.hosts.comparison import BOUND, HOSTS, compare
-from orchestrator.exchange.hosts.here import fmi_of
+from orchestrator.exchange.hosts import BOUND, HOSTS, compare, fmi_of
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
 from orchestrator.machine.errors import InputError, listed
-from orchestrator.program.components import definitions_of
 from orchestrator.program.files import ProgramFiles, write_files
 from orchestrator.program.fmu import SystemModel, write_fmu
 from orchestrator.runs.folder import replace_files
@@ -238,16 +236,12 @@ def _export(options: argparse.Namespace) -> int:
     folder = options.out or Path("exports", prepared.scenario.stem)
     with replace_files(folder, force=options.force) as staging:
         if options.format == FMU:
-            definitions = definitions_of(system)
-            model = SystemModel(
-                prepared.plan, definitions, system.name, prepared.scenario.title or system.name
-            )
+            title = prepared.scenario.title or system.name
+            model = SystemModel(prepared.plan, system.name, title)
             written = write_fmu(model, staging, options.fmi, options.platforms, say)
         elif options.format == C:
             title = prepared.scenario.title or system.name
-            program = ProgramFiles(
-                prepared.plan, definitions_of(system), prepared.scenario.stem, title, options.single
-            )
+            program = ProgramFiles(prepared.plan, prepared.scenario.stem, title, options.single)
             written = write_files(program, staging)
         elif options.format == OSP:
             written = write_osp(system, staging)
@@ -321,11 +315,11 @@ def _verify_carried(options: argparse.Namespace) -> int:
     for note in carried.notes:
         say(f"warning: {note}")
     judged = []
-    for judgement in carried.judgements(options.tolerance):
-        show(f"{judgement.name}: {judgement.text}")
-        for note in judgement.notes:
-            say(f"warning: {judgement.name}: {note}")
-        judged += [] if judgement.agrees is None else [judgement.agrees]
+    for verdict in carried.verdicts(options.tolerance):
+        show(f"{verdict.name}: {verdict.text}")
+        for note in verdict.notes:
+            say(f"warning: {verdict.name}: {note}")
+        judged += [] if verdict.agrees is None else [verdict.agrees]
     if not judged:
         raise InputError(f"{options.table}: carries no reference results")
     counted = f"{sum(judged)} of {len(judged)} experiments with results agree"

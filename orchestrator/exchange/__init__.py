@@ -1,1 +1,1 @@
-"""Other tools: hosts that run the bundle, verification of their tables."""
+"""Exchange with other tools: verification of tables and FMUs, runs in other hosts, the release."""

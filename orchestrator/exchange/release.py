@@ -1,4 +1,4 @@
-"""The release: an archive for each version of FMI, with all that a user of the FMUs needs.
+"""The release: an archive with everything that a user of the FMUs needs, per version of FMI.
 
 The same sources and the same compiler give the same bytes.
 """
@@ -18,18 +18,17 @@ from orchestrator.machine.identity import package_folder
 from orchestrator.runs.bundle import ARCHIVE, build_bundle, write_checksums
 from orchestrator.runs.folder import replace_files
 
-#: The page of an archive.
+#: Page of an archive, and its template.
 _PAGE, _TEMPLATE = "README.md", Path(__file__).with_name("release.md")
 
-#: Where the reference results of the system are: with the package that was built, or in the
-#: repository.
+#: Folders of the system's reference results, in an installed package and in the repository.
 _REFERENCES = Path(__file__).with_name(REFERENCE), Path(__file__).parents[2] / REFERENCE
 
-#: The version of SSP that goes with each of FMI.
+#: Version of SSP for each version of FMI.
 _SSP_VERSIONS: dict[str, str] = dict(zip(FMI_VERSIONS, ("1.0", "2.0"), strict=True))
 
-#: The licences of what ziglang links into libraries, where it has them: parts of zig's C library,
-#: and for Windows of mingw-w64's.
+#: Licences in the package of ziglang for code that it links into libraries: parts of zig's C
+#: library and, on Windows, of mingw-w64.
 _LINKED = {"zig.txt": "LICENSE", "mingw-w64.txt": "lib/libc/mingw/COPYING"}
 
 
@@ -37,9 +36,9 @@ def write_release(folder: Path, hear: Callable[[str], None], *, force: bool = Fa
     """Write the archives of a release.
 
     Args:
-        folder: made if it does not exist.
+        folder: target folder; made if it does not exist.
         hear: called with a line when a library is made.
-        force: move aside files of the user's that have names of these.
+        force: move aside the user's files with the names of the archives.
 
     Returns:
         The archives.
@@ -60,21 +59,21 @@ def write_release(folder: Path, hear: Callable[[str], None], *, force: bool = Fa
 
 
 def _contents(folder: Path, fmi: str, hear: Callable[[str], None]) -> Iterator[tuple[str, bytes]]:
-    """The files of an archive by their names, made in a folder."""
+    """Build the files of an archive in a folder; yield their names and contents."""
     build_bundle(folder, kind=NATIVE, fmi=fmi, platforms="all", hear=hear)
     others = {_PAGE: _page(fmi), **dict(_licences()), **dict(_references())}
     for name, content in others.items():
         path = folder / name
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(content)
-    # In an order of their own: a folder's is another one elsewhere.
+    # Sorted, as the order of a folder differs between machines.
     files = sorted((*folder.glob("*.fmu"), folder / ARCHIVE, *(folder / name for name in others)))
     for path in (*files, write_checksums(folder, files)):
         yield path.relative_to(folder).as_posix(), path.read_bytes()
 
 
 def _page(fmi: str) -> bytes:
-    """What there is, and which file is for which tool."""
+    """Return the page on the files of an archive."""
     described = {name: source_of(name).definition.summary for name in components()}
     fmus = "\n".join(f"| `{name}.fmu` | {text} |" for name, text in described.items())
     names = ", ".join(platform.name for platform in platforms(fmi, "all"))
@@ -85,18 +84,18 @@ def _page(fmi: str) -> bytes:
 
 
 def _licences() -> Iterator[tuple[str, bytes]]:
-    """Licences of the FMUs, and of what a compiler links into their libraries."""
+    """Yield the licences of the FMUs, and of code that the compiler links into their libraries."""
     yield "licenses/auv-fmu.txt", licences(NATIVE).encode()
     for name, file in _LINKED.items():
         yield f"licenses/{name}", (package_folder("ziglang") / file).read_bytes()
 
 
 def _references() -> Iterator[tuple[str, bytes]]:
-    """Reference results of each FMU, and of the system."""
+    """Yield the reference results of each FMU, and of the system."""
     folder = next(folder for folder in _REFERENCES if folder.is_dir())
     paths = [*folder.glob("auv_*")]
     for name in components():
-        # Beside them is what the FMU carries itself.
+        # The folder also has files that the FMU itself carries.
         paths += (source_of(name).folder / REFERENCE).glob(f"{name}_*")
     for path in paths:
         yield f"{REFERENCE}/{path.name}", path.read_bytes()

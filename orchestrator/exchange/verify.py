@@ -1,9 +1,9 @@
-"""A table from any tool, read in full and compared with our own runs of the same system."""
+"""Verification of a table from any tool by our own runs of the same system."""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from math import inf
@@ -31,15 +31,15 @@ from orchestrator.cosim import (
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.texts import BOOLEANS, finite
 from orchestrator.runs.preparation import DEFAULT_STEP
-from orchestrator.runs.tables import SEPARATORS, Record, places_of_time, port_of, records, time_of
+from orchestrator.runs.tables import SEPARATORS, places_of_time, port_of, records, time_of
 
-#: How far values may differ where nothing else is said.
+#: Default of the largest accepted difference.
 TOLERANCE = 1e-6
 
-#: How many names of a list are said where not all are.
+#: Number of names that are listed if not all are.
 _FIRST = 5
 
-#: What is said of the exchange before the first step.
+#: Description of the exchange before the first step.
 _STARTS = {
     "full": "",
     "none": ", no values exchanged in initialisation mode",
@@ -48,14 +48,14 @@ _STARTS = {
 
 
 class Algorithm(NamedTuple):
-    """A way to run a system, as some tool may.
+    """A way in which a tool may run a system.
 
     Attributes:
-        order: of its components.
+        order: order of its components.
         coupling: how its rings are closed.
-        exchange: of values.
-        words: for it.
-        turned: whether outputs are read on the other side of the exchange of values than we do.
+        exchange: exchange of values.
+        words: description for messages.
+        turned: if set, outputs are read on the other side of the exchange of values than in ours.
 
     """
 
@@ -66,7 +66,7 @@ class Algorithm(NamedTuple):
     turned: bool = False
 
     def turn(self) -> Algorithm:
-        """The same with outputs read on the other side."""
+        """Return the same algorithm with outputs read on the other side."""
         side = "before" if self.order == "feedthrough" else "after"
         words = f"{self.words}, outputs read {side} values are passed on"
         return self._replace(words=words, turned=True)
@@ -88,10 +88,10 @@ class Algorithm(NamedTuple):
 
 
 class _Turned:
-    """Gives an observer the rows of a tool that reads outputs on the other side of the exchange.
+    """An observer's view of a tool that reads outputs on the other side of the exchange.
 
-    In feedthrough order we read them after values were passed on, in the others before. It reads
-    them again between two steps, as a hook, and leaves the row as it was.
+    Our master reads outputs after values were passed on in feedthrough order, and before in the
+    others. As a hook, this reads them again between two steps and restores the row.
     """
 
     def __init__(self, observer: Observer) -> None:
@@ -99,10 +99,10 @@ class _Turned:
         self.begin, self.end = observer.begin, observer.end
 
     def take(self, rows: np.ndarray) -> None:
-        """Pass over our own rows."""
+        """Ignore the master's own rows."""
 
     def act(self, run: Run) -> int:
-        """Give the row of now."""
+        """Pass the current row to the observer."""
         row, before = run.row, run.row.values.copy()
         if run.passing is None:
             for name in run.instances:
@@ -136,20 +136,20 @@ def verify(
 
     Args:
         path: CSV with a time column and columns named after our ports.
-        system: that the tool has run.
-        tolerance: largest difference that is accepted, relative to the larger of one and the
-            largest magnitude of the port.
-        order: in which the tool steps the components, with `a+b` for some that it steps side by
-            side; None: one of :data:`Experiment.ORDERS`.
-        events: that have happened in its run.
-        initial: what it exchanges before the first step.
-        verbose: whether all names of what was not compared are said.
+        system: the system that the tool ran.
+        tolerance: largest accepted difference, relative to the larger of one and the largest
+            magnitude of the port.
+        order: order in which the tool steps the components, with `a+b` for components that it
+            steps side by side; None: one of :data:`Experiment.ORDERS`.
+        events: events of its run.
+        initial: values that it exchanges before the first step.
+        verbose: if set, list all names of what was not compared.
 
     Returns:
-        What agrees, with which order of evaluation, and what was not compared, in lines.
+        Lines on what agrees, with which order of evaluation, and on what was not compared.
 
     Raises:
-        InputError: the file cannot be read in full, has no column of ours, or differs in every
+        InputError: the file cannot be read in full, has no column of an output, or differs in every
             order; the text names the port that differs first.
 
     """
@@ -168,7 +168,7 @@ def verify(
         for component in system.components.values()
         for variable in component.variables
     }
-    # A tool that runs one FMU names ports only.
+    # The table of a tool that runs a single FMU may have names without the component.
     names = [f"{name}." for name in system.components]
     start = system.start_time or 0.0
     table = read_table(path, outputs, known, names[0] if len(names) == 1 else "", start)
@@ -182,16 +182,13 @@ def verify(
     step = DEFAULT_STEP if system.step is None else system.step
     experiment = Experiment(float(table.time[-1]), step, start_time=start)
     complaints = []
-    # Most tools read outputs where we do.
-    for turned in (False, True):
-        for way in algorithms:
-            way = way.turn() if turned else way
-            complaint = _complaint(table, system, experiment, events, way, tolerance)
-            if complaint is None:
-                said = _certificate(table, start, system, outputs, way, tolerance, verbose)
-                return "\n".join(said)
-            complaints.append(complaint)
-    # Of each pair the one that agrees for longer, which is the likelier one.
+    # Most tools read outputs on the same side of the exchange as our master.
+    for way in [*algorithms, *(way.turn() for way in algorithms)]:
+        complaint = _complaint(table, system, experiment, events, way, tolerance)
+        if complaint is None:
+            return "\n".join(_certificate(table, start, system, outputs, way, tolerance, verbose))
+        complaints.append(complaint)
+    # The side on which a way agrees for longer is the likelier one.
     n = len(algorithms)
     likelier = (max(pair) for pair in zip(complaints[:n], complaints[n:], strict=True))
     other = f"not a run of {system.name}, which --scenario names"
@@ -199,25 +196,25 @@ def verify(
 
 
 def _of_one(system: System, outputs: Collection[str], columns: Sequence[str]) -> str:
-    """A hint for the table of a tool that ran one component only; empty: it is none."""
+    """Return a hint if the table looks like one of a tool that ran only one component."""
     longest = max(map(len, outputs), default=0)
-    found = {
+    counts = {
         component.fmu.name: sum(
             port_of(f"{name}.{column.strip()}", outputs, longest) is not None for column in columns
         )
         for name, component in system.components.items()
     }
-    fmu = max(found, key=lambda name: found[name])
-    if not found[fmu]:
+    fmu = max(counts, key=counts.__getitem__)
+    if not counts[fmu]:
         return ""
     return f"; for the table of a tool that ran only {fmu}, add --scenario {fmu}"
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Check that not just anything agrees to a tolerance.
+    """Check that a tolerance is at least 0 and less than 1.
 
     Raises:
-        InputError: it does, or nothing can.
+        InputError: it is not: nothing, or anything, would agree.
 
     """
     if not 0.0 <= tolerance < 1.0:
@@ -225,7 +222,7 @@ def check_tolerance(tolerance: float) -> None:
 
 
 def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorithm]:
-    """The ways to run a system that a table may agree with, the likeliest first.
+    """Yield the ways to run a system that a table may agree with, the likeliest first.
 
     Raises:
         InputError: there is no such order.
@@ -247,10 +244,10 @@ def ways(system: System, order: Order | None, initial: str) -> Iterator[Algorith
     # Other tools solve rings, or delay them.
     for coupling in (None, "delay") if system.rings() else (None,):
         delayed = ", rings delayed" * (coupling == "delay")
-        for one in Experiment.ORDERS if order is None else (order,):
-            named = Experiment.format_order(one)
-            words = f"in {named} order" if isinstance(one, str) else f"as run --order {named}"
-            yield Algorithm(one, coupling, exchange, f"{words}{delayed}{start}")
+        for each in Experiment.ORDERS if order is None else (order,):
+            named = Experiment.format_order(each)
+            words = f"in {named} order" if isinstance(each, str) else f"as run --order {named}"
+            yield Algorithm(each, coupling, exchange, f"{words}{delayed}{start}")
 
 
 def _complaint(
@@ -261,23 +258,23 @@ def _complaint(
     way: Algorithm,
     tolerance: float,
 ) -> tuple[float, str] | None:
-    """Until when a table agrees with our own run, and what is wrong then; None: nothing is."""
+    """Return until when a table agrees with our own run, and the difference; None: none."""
     ours = _Samples(table.time, tuple(table.columns))
     try:
         way.run(system, experiment, ours, *([Events(events)] if events else []))
     except InputError as error:
         return -inf, f"{way.words} our own run fails: {error}"
-    # What is shown before the first step depends on how a tool exchanges initial values.
+    # A tool's row before the first step depends on how it exchanges initial values.
     after = table.time > experiment.start_time
     difference = _first_difference(table.time, table.columns, ours.values, tolerance, after)
     return difference and (difference[0], f"{way.words} {difference[1]}")
 
 
 class _Samples:
-    """An observer that keeps some columns at some times, linear between the rows.
+    """An observer that keeps some columns at given times, interpolated between the rows.
 
     Attributes:
-        values: (times, columns).
+        values: values in shape (times, columns).
 
     """
 
@@ -287,29 +284,26 @@ class _Samples:
         self.values = np.full((len(times), len(columns)), np.nan)
 
     def begin(self, header: Header) -> None:
-        """Find out where the columns are."""
-        self._places = [header.place[name] for name in self._columns]
+        """Note the places and types of columns."""
         self._header = header
-        self._integers = [name for name, of in header.types.items() if of != "String"]
         self._last = np.empty((0, 1 + len(header.columns)))
 
     def take(self, rows: np.ndarray) -> None:
-        """Take the samples that lie between some rows."""
+        """Take the samples between these rows."""
         rows = np.vstack((self._last, rows))
-        for name in self._integers:
-            rows[:, self._header.place[name]] = self._header.values(name, rows)
         self._sample(rows, int(np.searchsorted(self._times, rows[-1, 0], side="right")))
         self._last = rows[-1:].copy()
 
     def end(self, ending: Ending) -> None:
-        """Take the samples that lie after the last row, apart from rounding."""
+        """Take the samples that rounding has put after the last row."""
         if len(self._last):
             self._sample(self._last, len(self._times))
 
     def _sample(self, rows: np.ndarray, end: int) -> None:
         times = self._times[self._n : end]
-        for i, place in enumerate(self._places):
-            self.values[self._n : end, i] = np.interp(times, rows[:, 0], rows[:, place])
+        for i, name in enumerate(self._columns):
+            values = self._header.values(name, rows)
+            self.values[self._n : end, i] = np.interp(times, rows[:, 0], values)
         self._n = end
 
 
@@ -344,7 +338,7 @@ def _certificate(
     tolerance: float,
     verbose: bool,
 ) -> Iterator[str]:
-    """What was compared and found to agree, and what was not compared."""
+    """Yield lines on what was compared and agrees, and on what was not compared."""
     times = table.time[table.time > start]
     yield (
         f"{len(table.columns)} of {len(outputs)} outputs agree to {tolerance:g} in {len(times)} "
@@ -365,7 +359,7 @@ def _certificate(
 
 
 def enumerated(names: Sequence[str], verbose: bool) -> str:
-    """All names, or how many they are and the first of them."""
+    """Join names with commas; without `verbose`, give only the number and the first of many."""
     if verbose or len(names) <= _FIRST:
         return ", ".join(names)
     return f"{len(names)}, such as {', '.join(names[:_FIRST])} (--verbose lists all)"
@@ -373,13 +367,13 @@ def enumerated(names: Sequence[str], verbose: bool) -> str:
 
 @dataclass(frozen=True)
 class ForeignTable:
-    """What a table holds.
+    """Content of a table from another tool.
 
     Attributes:
-        time: of its rows [s], growing from the start of the run or later.
-        columns: of the ports that were asked for, those that it has, by our names.
-        others: names of its other columns, as they stand there.
-        repeated: how many rows are passed over, for the one before them is of the same time.
+        time: times of the rows [s], increasing, at or after the start of the run.
+        columns: values of the wanted ports that it has, by our names.
+        others: names of its other columns, unchanged.
+        repeated: number of rows that are skipped, as their time is that of the row before.
 
     """
 
@@ -396,60 +390,51 @@ def read_table(
     before: str = "",
     start: float = 0.0,
 ) -> ForeignTable:
-    """Read a table: every value of the time and of the ports in it, or none.
+    """Read all values of the time and of the wanted ports in a table.
 
     Args:
-        path: CSV with a line of names; the separators are commas, semicolons or tabs.
-        ports: types of the ports that are looked for, by `component.port`.
-        known: names of all ports; names of systems may stand before them.
-        before: what a column's name may lack.
-        start: before which there must be no row [s].
+        path: CSV with a line of names, separated by commas, semicolons or tabs.
+        ports: types of the wanted ports, by `component.port`.
+        known: names of all ports; in the table, they may follow names of systems.
+        before: prefix that the names of columns may lack.
+        start: time before which there must be no row [s].
 
     Raises:
-        InputError: a row is not as long as the first, a time falls, a value is no number,
-            or a port has two columns, or the time has two that differ.
+        InputError: a row is not as long as the first, a time decreases, a value is not a number,
+            a port has two columns, or the time has two that differ.
 
     """
-    what = "not a table that can be compared"
-    with records(path, what, places_of_time) as (names, rows):
-        return _table(names, rows, ports, known, before, start)
-
-
-def _table(
-    names: Sequence[str],
-    rows: Iterable[Record],
-    ports: Mapping[str, str],
-    known: Collection[str],
-    before: str,
-    start: float,
-) -> ForeignTable:
-    clocks = places_of_time(names)
-    if not clocks:
-        separators = ", ".join(SEPARATORS.values())
-        raise ValueError(f"no column of its first line is named time (separators are {separators})")
+    separators = ", ".join(SEPARATORS.values())
     places: dict[str, int] = {}
     longest = max(map(len, known), default=0)
-    for place, name in enumerate(names):
-        port = port_of(f"{before}{name.strip()}", known, longest)
-        port = port if port in ports else None
-        if port in places:
-            raise ValueError(f"columns {1 + places[port]} and {1 + place} are both {port}")
-        if port is not None and place not in clocks:
-            places[port] = place
-    time, columns = array("d"), {port: array("d") for port in places}
-    for expected, (line, row) in enumerate(rows, start=2):
-        if line != expected:
-            raise ValueError(f"line {expected} is empty")
-        where = f"line {line}"
-        time.append(time_of(row, clocks, where))
-        if time[-1] < start:
-            raise ValueError(f"{where}: time {time[-1]:g} s is before the start at {start:g} s")
-        if len(time) > 1 and time[-1] < time[-2]:
+    with records(path, "not a table that can be compared", places_of_time) as (names, rows):
+        clocks = places_of_time(names)
+        if not clocks:
             raise ValueError(
-                f"{where}: time {time[-1]:.9g} s follows {time[-2]:.9g} s; times must not decrease"
+                f"no column of its first line is named time (separators are {separators})"
             )
-        for port, place in places.items():
-            columns[port].append(_value(row[place], ports[port], f"{where}, {names[place]}"))
+        for place, name in enumerate(names):
+            port = port_of(f"{before}{name.strip()}", known, longest)
+            port = port if port in ports else None
+            if port in places:
+                raise ValueError(f"columns {1 + places[port]} and {1 + place} are both {port}")
+            if port is not None and place not in clocks:
+                places[port] = place
+        time, columns = array("d"), {port: array("d") for port in places}
+        for expected, (line, row) in enumerate(rows, start=2):
+            if line != expected:
+                raise ValueError(f"line {expected} is empty")
+            where = f"line {line}"
+            time.append(time_of(row, clocks, where))
+            if time[-1] < start:
+                raise ValueError(f"{where}: time {time[-1]:g} s is before the start at {start:g} s")
+            if len(time) > 1 and time[-1] < time[-2]:
+                raise ValueError(
+                    f"{where}: time {time[-1]:.9g} s follows {time[-2]:.9g} s; times must not "
+                    "decrease"
+                )
+            for port, place in places.items():
+                columns[port].append(_value(row[place], ports[port], f"{where}, {names[place]}"))
     others = [name for i, name in enumerate(names) if i not in (*clocks, *places.values())]
     times = np.array(time)
     new = np.diff(times, prepend=-np.inf) > Experiment.ROUNDING * np.abs(times)

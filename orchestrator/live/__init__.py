@@ -1,1 +1,1 @@
-"""The closed loop in a web page: its program in WebAssembly, and what shows its rows."""
+"""The closed loop in a web page: programs in WebAssembly run it, and charts show its rows."""

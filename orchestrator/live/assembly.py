@@ -1,4 +1,4 @@
-"""Pages in one file that needs no other: script, style, data, and modules or rows.
+"""Self-contained pages in one file: script, style, data, and modules or rows.
 
 Script and style are bundled by esbuild, which npm installs, and cached like the modules.
 """
@@ -33,35 +33,35 @@ Plain = dict[str, Any]
 #: Category in the cache.
 CATEGORY = "live-script"
 
-#: Scripts of the page of a loop and of stored runs, by the kinds of pages.
+#: Scripts by the kind of page: of a loop that runs, and of stored runs.
 SCRIPTS = {"live": "live.js", "view": "view.js"}
 
-#: The style of all pages, the engine for Node.js, and the licences of packages in them.
+#: Style of all pages, engine for Node.js, and licences of the packages in them.
 STYLE, ENGINE, LICENCES = "page.css", "engine.mjs", "licences.txt"
 FILES = (*SCRIPTS.values(), STYLE, ENGINE, LICENCES)
 
 WEB = Path(__file__).with_name("web")
 
-#: The page, with `{{NAME}}` in the place of each part, and what only pages of one kind have between
+#: Template of the page, with `{{NAME}}` for each part. Parts for one kind of page are between
 #: `<!--KIND-->` and `<!--/KIND-->`.
 _PAGE = WEB / "page.html"
 
-#: Sources that decide the bundle.
+#: Sources of the bundle.
 _SOURCES = ("package.json", "package-lock.json", ".npmrc", "build.mjs", "src")
 
-#: Options of `npm ci`. The packages bring programs for each machine: none needs a script. Without a
-#: network, npm's own two retries would take more than a minute.
+#: Options of `npm ci`. No package needs its install script, as each has a program per machine.
+#: Without a network, npm's default of two retries would take more than a minute.
 _OPTIONS = ("--omit=dev", "--ignore-scripts", "--prefer-offline", "--fetch-retries=1")
 
 #: Groups of signals that have charts, with the units of their members.
 _CHARTS = {"e": POSITION, "tau": TAU, "dy": VELOCITY, "theta_hat": THETA}
 
-#: A line in which npm, esbuild or Node.js says what is wrong, not only that something is.
+#: A line with the reason of an error of npm, esbuild or Node.js.
 _COMPLAINT = re.compile(
     r"npm (?:error|ERR!) (?!code|syscall|errno|engine|notsup Not)\S|.*\bERROR\b|Error: "
 )
 
-#: How long npm or esbuild may take [s].
+#: Time limit of npm and of esbuild [s].
 _LIMIT = 600.0
 
 
@@ -75,10 +75,10 @@ def assemble(
     """Put a page together.
 
     Args:
-        kind: of :data:`SCRIPTS`.
-        data: for the script, beside what all pages hold.
+        kind: key of :data:`SCRIPTS`.
+        data: data for the script, in addition to that of all pages.
         binary: modules or rows.
-        fields: texts of the page by their names, not escaped.
+        fields: texts of the page by name, not escaped.
         hear: called with a line before a part is made, which may take minutes.
 
     Raises:
@@ -110,8 +110,8 @@ def assemble(
 
 
 def _common() -> Plain:
-    """What the script of every page reads, by the names of `web/src/types.ts`."""
-    indices = [(one.name, one.label, one.meaning, one.units) for one in metrics()]
+    """Return the data of all pages, with the names in `web/src/types.ts`."""
+    indices = [(index.name, index.label, index.meaning, index.units) for index in metrics()]
     meaning = "smallest distance between the centres of mass of any two vehicles"
     indices.append((SMALLEST_DISTANCE, SMALLEST_DISTANCE_LABEL, meaning, {"": "m"}))
     return {
@@ -125,7 +125,7 @@ def _common() -> Plain:
 
 
 def vehicle_data(loop: Loop) -> dict[str, str]:
-    """The components of a vehicle by their roles."""
+    """Return the components of a vehicle by role."""
     return {"name": loop.name, "allocation": "", **asdict(loop)}
 
 
@@ -134,17 +134,17 @@ def _printed(units: Mapping[Any, str]) -> dict[str, str]:
 
 
 def hash_source(text: str) -> str:
-    """What a content security policy allows an element of the page by: the digest of its text."""
+    """Return the digest of an element's text, by which a content security policy allows it."""
     return f"sha256-{b64encode(sha256(text.encode()).digest()).decode()}"
 
 
 def packed(content: bytes) -> str:
-    """Bytes in the form that the page unpacks: gzip in base64, without a date."""
+    """Compress bytes for the page: gzip without a date, in base64."""
     return b64encode(gzip.compress(content, mtime=0)).decode()
 
 
 def live_script(hear: Callable[[str], None] = lambda line: None) -> dict[str, Path]:
-    """The files by their names, bundled unless they are in the cache.
+    """Return the paths of the files by name; bundle them unless they are in the cache.
 
     Args:
         hear: called with a line before they are bundled.
@@ -160,7 +160,7 @@ def live_script(hear: Callable[[str], None] = lambda line: None) -> dict[str, Pa
 
 
 def key_of() -> str:
-    """Key in the cache: digest of the sources."""
+    """Return the key in the cache: digest of the sources."""
     digest = sha256()
     for path in _sources():
         digest.update(f"{path.relative_to(WEB).as_posix()}\0".encode())
@@ -175,14 +175,14 @@ def _sources() -> list[Path]:
 
 
 def bundled(hear: Callable[[str], None] = lambda line: None) -> dict[str, bytes]:
-    """The contents of the files by their names, bundled now.
+    """Bundle the files, and return their contents by name.
 
     Args:
         hear: called with a line before they are bundled.
 
     Raises:
         InputError: npm is not installed, or it or esbuild fails.
-        OSError: a file cannot be written, or a program not started.
+        OSError: a file cannot be written, or a program cannot be started.
 
     """
     npm = shutil.which("npm")
@@ -212,5 +212,5 @@ def _run(folder: Path, *command: str) -> None:
         raise InputError(f"{' '.join(command[:2])} did not finish within {_LIMIT:g} s") from None
     if process.returncode != 0:
         complaints = [line for line in process.stderr.splitlines() if _COMPLAINT.match(line)]
-        said = (complaints or [last_line(process.stderr)])[0]
-        raise InputError(f"the script of the page cannot be built: {' '.join(command[:2])}: {said}")
+        why = (complaints or [last_line(process.stderr)])[0]
+        raise InputError(f"the script of the page cannot be built: {' '.join(command[:2])}: {why}")

@@ -1,7 +1,7 @@
-"""The page in which a loop runs: scenarios beside their comparisons, and events, as plain data.
+"""The live page: scenarios with their comparisons and events, as plain data.
 
-Names and meanings are the ones of `web/src/types.ts`. What a plan decides is decided here: which
-program makes its steps, which parameters a comparison shares, and to which inputs an event gets.
+Names and meanings are those in `web/src/types.ts`. Everything that depends on a plan is decided
+here: the program of each loop, the parameters that a comparison shares, the inputs of an event.
 """
 
 from __future__ import annotations
@@ -16,25 +16,16 @@ from typing import Any, NamedTuple
 
 from fmus.kinds import NATIVE
 from orchestrator.cosim import (
-    Alter,
     Component,
     Event,
-    Freeze,
     PortName,
-    Release,
-    Reset,
-    Set,
-    Stop,
     System,
-    Value,
 )
 from orchestrator.figures.style import printed_unit, reference_colours, vehicle_colours
 from orchestrator.live.assembly import Plain, assemble, vehicle_data
-from orchestrator.live.module import LICENCES, MODULE, live_module
-from orchestrator.live.programs import REDUCERS, Programs
+from orchestrator.live.module import LICENCES, MODULE, REDUCERS, Programs, live_module
 from orchestrator.machine.errors import InputError
-from orchestrator.program.reducing import looking_at
-from orchestrator.program.writer import Text
+from orchestrator.program.writer import Text, indices_of
 from orchestrator.runs.preparation import Prepared, load_scenario, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import (
@@ -50,12 +41,12 @@ from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
 class _Controller(NamedTuple):
-    """A controller that the page knows.
+    """A controller that the page supports in comparisons.
 
     Attributes:
-        label: of its lines, where a scenario has none.
-        other: the FMU of the controller that it is compared with, where a scenario names none.
-        measures_velocity: whether it takes `dy` of the vehicle.
+        label: label of its lines, unless the scenario has one.
+        other: FMU of the controller to compare with, unless the scenario names one.
+        measures_velocity: true if it takes `dy` of the vehicle.
 
     """
 
@@ -64,21 +55,21 @@ class _Controller(NamedTuple):
     measures_velocity: bool
 
 
-#: In the order in which they are drawn.
+#: Controllers by their FMUs, in the order in which they are drawn.
 _CONTROLLERS = {
     "ObserverController": _Controller("proposed", "PdController", measures_velocity=False),
     "PdController": _Controller("PD", "ObserverController", measures_velocity=True),
 }
 
-#: The page keeps all rows of a run in its memory, and refuses more steps of all vehicles together.
+#: Most steps, of all vehicles together: the page keeps all rows of a run in memory.
 _MOST_STEPS = 200_000
 
-#: Paths of more are hard to tell apart.
+#: Most vehicles: paths of more are hard to distinguish.
 _MOST_VEHICLES = 10
 
 
 def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> str:
-    """The page.
+    """Make the page.
 
     Args:
         opened: the scenario that it shows first.
@@ -89,9 +80,9 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
 
     """
     data, programs = page_data(opened)
-    modules = [live_module(one.sources, hear) for one in programs]
+    modules = [live_module(each.sources, hear) for each in programs]
     linked = modules[0][LICENCES].read_text(encoding="utf-8")
-    titles = {one["name"]: one["title"] for one in data["presets"]}
+    titles = {each["name"]: each["title"] for each in data["presets"]}
     binary = [module[MODULE].read_bytes() for module in modules]
     return assemble(
         "live", data, binary, {"title": titles[data["opened"]], "licences": linked}, hear
@@ -99,7 +90,7 @@ def live_page(opened: str, hear: Callable[[str], None] = lambda line: None) -> s
 
 
 def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
-    """All presets, the opened one among them, and the programs that run them.
+    """Return the data of all presets, including the opened one, and the programs that run them.
 
     Args:
         opened: a scenario of the bundle, or the path of a file.
@@ -110,15 +101,15 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
     """
     first, modules = preset(opened)
     for run in runs_of(opened):
-        # What a component refuses is refused here, before there is a page.
+        # A value that a component refuses is refused before the page is made.
         run.run([])
     others = [preset(name)[0] for name in names() if name != first["name"]]
     presets = sorted([first, *others], key=itemgetter("name"))
     measured: list[list[Plain]] = []
-    for loop in (loop for one in presets for loop in one["loops"]):
-        # Most vehicles have the same.
-        measured += [one for one in loop["measured"] if one not in measured]
-        loop["measured"] = [measured.index(one) for one in loop["measured"]]
+    for loop in (loop for each in presets for loop in each["loops"]):
+        # Most vehicles have the same indices: share them.
+        measured += [indices for indices in loop["measured"] if indices not in measured]
+        loop["measured"] = [measured.index(indices) for indices in loop["measured"]]
     data = {
         "opened": first["name"],
         "mostSteps": _MOST_STEPS,
@@ -130,7 +121,7 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
 
 @cache
 def bundled() -> Programs:
-    """The programs of all scenarios of the bundle, and of what they are compared with."""
+    """Return the programs of all scenarios of the bundle and of their comparisons."""
     return Programs([run for both in _bundled_runs().values() for run in both])
 
 
@@ -140,7 +131,7 @@ def _bundled_runs() -> Mapping[str, list[Prepared]]:
 
 
 def preset(name: str) -> tuple[Plain, Sequence[Programs]]:
-    """A scenario, and what it is compared with; the programs among which theirs are.
+    """Return the data of a scenario with its comparison, and the programs that include theirs.
 
     Raises:
         InputError: there is no such scenario, or the page cannot run it.
@@ -151,17 +142,17 @@ def preset(name: str) -> tuple[Plain, Sequence[Programs]]:
     if None in found:
         modules.append(Programs(both))
         found = [modules[1].find(run) for run in both]
-    programs = (_Program(len(modules) - 1, *one) for one in found if one is not None)
-    return _preset(name, both, [*programs]), modules
+    programs = [_Program(len(modules) - 1, *each) for each in found if each is not None]
+    return _preset(name, both, programs), modules
 
 
 class _Program(NamedTuple):
     """The program of a run.
 
     Attributes:
-        module: the number of the module that has it.
-        number: its number there.
-        text: what it is written from.
+        module: number of its module.
+        number: its number in the module.
+        text: its text.
 
     """
 
@@ -172,13 +163,13 @@ class _Program(NamedTuple):
 
 def _preset(name: str, both: Sequence[Prepared], programs: Sequence[_Program]) -> Plain:
     scenario, experiment = both[0].scenario, both[0].plan.experiment
-    loops = [_loop(one, scenario, program) for one, program in zip(both, programs, strict=True)]
+    loops = [_loop(run, scenario, program) for run, program in zip(both, programs, strict=True)]
     fleet = both[0].loops if len(both[0].loops) > 1 else ()
     loops[0]["scenario"] = name
     if len({loop["label"] for loop in loops}) < len(loops):
-        # The page tells loops apart by their labels.
-        for one, loop in zip(both, loops, strict=True):
-            loop["label"] = one.scenario.name
+        # The page identifies loops by their labels.
+        for run, loop in zip(both, loops, strict=True):
+            loop["label"] = run.scenario.name
     return {
         "name": scenario.name,
         "title": scenario.title or scenario.name,
@@ -195,7 +186,7 @@ def _preset(name: str, both: Sequence[Prepared], programs: Sequence[_Program]) -
 
 
 def runs_of(name: str) -> list[Prepared]:
-    """The run of a scenario, and the one that it is compared with, if there is one.
+    """Prepare a scenario and its comparison, if it has one.
 
     Raises:
         InputError: there is no such scenario, or the page cannot run it.
@@ -206,9 +197,9 @@ def runs_of(name: str) -> list[Prepared]:
     own = prepare(scenario, system, request)
     compare = scenario.compare or _other(scenario, system)
     both = with_companion(replace(own, scenario=replace(scenario, compare=compare)), request)
-    for one in both:
-        _check(one)
-    if len({len(one.loops) for one in both}) > 1:
+    for run in both:
+        _check(run)
+    if len({len(run.loops) for run in both}) > 1:
         raise InputError(
             f"{scenario.name}: the live page cannot run a comparison with another number of "
             "vehicles"
@@ -217,7 +208,7 @@ def runs_of(name: str) -> list[Prepared]:
 
 
 def _other(scenario: Scenario, system: System) -> Difference | None:
-    """The comparison of a vehicle of the paper's loop with the controller that it lacks."""
+    """Return the comparison of a vehicle of the paper's loop with the other controller."""
     controller, [loop, *others] = _controller(system), loops_of(system)
     if not scenario.digest or controller is None or others:
         return None
@@ -234,13 +225,13 @@ def _other(scenario: Scenario, system: System) -> Difference | None:
 
 
 def _controller(system: System) -> _Controller | None:
-    """The controller of the first vehicle."""
+    """Return the controller of the first vehicle."""
     found = system.components.get(loops_of(system)[0].controller)
     return _CONTROLLERS.get(_type(found)) if found else None
 
 
 def _place(system: System) -> int:
-    """The place of a system's controller among all."""
+    """Return the place of a system's controller in the order of drawing."""
     controller = _controller(system)
     return [*_CONTROLLERS.values()].index(controller) if controller else 0
 
@@ -253,7 +244,7 @@ def _check(prepared: Prepared) -> None:
     """Check that the page can run a scenario.
 
     Raises:
-        InputError: it cannot.
+        InputError: it cannot, with the reason.
 
     """
     plan = prepared.plan
@@ -281,12 +272,12 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
     return {
         "label": scenario.label or (controller.label if controller else scenario.name),
         "vehicles": list(map(vehicle_data, prepared.loops)),
-        "measured": [_measured(text, one) for one in prepared.loops],
+        "measured": [_measured(text, loop) for loop in prepared.loops],
         "components": {name: _type(part) for name, part in system.components.items()},
         "head": {
             "order": scenario.order,
             "vehicles": scenario.vehicles,
-            "absent": [name for name, what in scenario.components.items() if what is False],
+            "absent": [name for name, fmu in scenario.components.items() if fmu is False],
             "only": [*scenario.only],
             "wires": {**scenario.wires},
         },
@@ -301,40 +292,40 @@ def _loop(prepared: Prepared, owner: Scenario, program: _Program) -> Plain:
 
 
 def _measured(text: Text, loop: Loop) -> list[Plain]:
-    """What makes the indices of a vehicle, and where it takes its numbers from."""
+    """Return the reducers of a vehicle's indices, with the sources of their numbers."""
     return [
         {
             "name": reducer.name,
             "takes": [
-                # JSON has nothing infinite.
-                str(one) if isinstance(one, PortName) else min(one, sys.float_info.max)
-                for one in sources
+                # JSON has no infinity.
+                str(source) if isinstance(source, PortName) else min(source, sys.float_info.max)
+                for source in sources
             ],
             "gives": [name for name, ports in reducer.results.items() for _ in ports],
         }
-        for reducer, sources in looking_at(text.plan.system, loop, REDUCERS)
+        for reducer, sources in indices_of(text.plan.system, loop, REDUCERS)
     ]
 
 
 def _ports(text: Text, name: str) -> dict[str, list[str]]:
-    """The inputs and outputs of a component, in the order of a program's rows."""
-    kind = text.kind(name)
-    return {group: [one.name for one in kind.ports[group]] for group in ("input", "output")}
+    """Return the inputs and outputs of a component, in the order of a program's rows."""
+    ports = text.kind(name).ports
+    return {group: [port.name for port in ports[group]] for group in ("input", "output")}
 
 
 def _restarted(text: Text, name: str) -> str:
-    """What a component says when its state is started over, with braces for the time."""
-    return re.sub(r"\{.*?\}", "{}", text.kind(name).said.restarted)
+    """Return the message of a component whose state is reset, with `{}` for the time."""
+    return re.sub(r"\{.*?\}", "{}", text.kind(name).behaviour.restarted)
 
 
 def _parameters(text: Text) -> Iterator[Plain]:
-    """What a user may change: parameters, and inputs that nothing feeds."""
+    """Yield the values that a user may change: parameters and unconnected inputs."""
     system = text.plan.system
     for name in text.parameters:
         component = system.components[name.component]
         variable, start = component.variables[name.port], component.start(name.port)
         value = system.parameters.get(name, start)
-        found: Plain = {
+        data: Plain = {
             "name": str(name),
             "type": variable.type,
             "description": variable.description or "",
@@ -342,21 +333,21 @@ def _parameters(text: Text) -> Iterator[Plain]:
             "value": variable.shown(value),
         }
         if variable.unit and variable.unit != "1":
-            found["unit"] = printed_unit(variable.unit)
+            data["unit"] = printed_unit(variable.unit)
         for end in ("min", "max"):
             if (limit := getattr(variable, end)) is not None:
-                found[end] = float(limit)
+                data[end] = float(limit)
         if choices := variable.items:
-            found["choices"] = {choice: int(number) for choice, number in choices.items()}
-        yield found
+            data["choices"] = {choice: int(number) for choice, number in choices.items()}
+        yield data
 
 
 def _events(prepared: Prepared, owner: Scenario) -> dict[str, list[Plain]]:
-    """All events that can happen to a system, by the scenario that has them.
+    """Return all events that can happen to a system, by the scenario that has them.
 
     Args:
         prepared: run of the system.
-        owner: the scenario of the preset.
+        owner: scenario of the preset.
 
     """
     system = replace(prepared.system, step=prepared.experiment.step)
@@ -365,22 +356,22 @@ def _events(prepared: Prepared, owner: Scenario) -> dict[str, list[Plain]]:
     return {
         name: [
             _event(number, event) | {"canEnd": not any(action in table for action in AT_ONCE)}
-            for number, table in some
+            for number, table in numbered
             for event in read_events(name, shared_events([table], system), system)
         ]
-        for name, some in tables.items()
-        if some
+        for name, numbered in tables.items()
+        if numbered
     }
 
 
 @cache
 def _bundled_events() -> Mapping[str, Sequence[Mapping[str, Any]]]:
-    """The events of the bundle's scenarios, by their names."""
+    """Return the events of the bundle's scenarios, by scenario."""
     return {name: read_scenario(name).events for name in names()}
 
 
 def _event(number: int, event: Event) -> Plain:
-    found = {
+    data = {
         "number": number,
         "text": event.text,
         "label": event.label,
@@ -391,27 +382,18 @@ def _event(number: int, event: Event) -> Plain:
     }
     if (when := event.when) is not None:
         signal = {"signal": str(when.signal)}
-        found["when"] = signal | {"comparison": when.comparison, "value": when.value}
-    return {key: value for key, value in found.items() if value is not None}
+        data["when"] = signal | {"comparison": when.comparison, "value": when.value}
+    return {key: value for key, value in data.items() if value is not None}
 
 
 def _action(event: Event) -> Plain:
-    match event.action:
-        case Alter(effect, values):
-            return {"kind": "alter", "effect": effect, "values": _assigned(values)}
-        case Freeze(targets):
-            return {"kind": "freeze", "targets": list(map(str, targets))}
-        case Release(targets):
-            return {"kind": "release", "targets": list(map(str, targets))}
-        case Set(parameters, inputs):
-            given = {"parameters": _assigned(parameters), "inputs": _assigned(inputs)}
-            return {"kind": "set", **given}
-        case Reset(components):
-            return {"kind": "reset", "components": list(components)}
-        case Stop(why):
-            return {"kind": "stop", "why": why}
-    raise TypeError(f"the page does not know the event {event.action!r}")
+    """Return the action of an event with the names of its fields, and its class as `kind`."""
+    fields = {name: _plain(value) for name, value in vars(event.action).items()}
+    return {"kind": type(event.action).__name__.lower(), **fields}
 
 
-def _assigned(values: Sequence[tuple[PortName, Value]]) -> list[list[Value]]:
-    return [[str(target), value] for target, value in values]
+def _plain(value: Any) -> Any:
+    """Convert names of ports to text, and tuples to lists."""
+    if isinstance(value, PortName):
+        return str(value)
+    return list(map(_plain, value)) if isinstance(value, tuple) else value

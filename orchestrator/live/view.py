@@ -1,8 +1,9 @@
-"""The page of stored runs: the live page's scene, charts and player over rows that are there."""
+"""The page of stored runs: the live page's scene, charts and player, for rows in the page."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain
 from math import inf
 from typing import Any, NamedTuple
 
@@ -14,13 +15,13 @@ from orchestrator.live.assembly import Plain, assemble, vehicle_data
 from orchestrator.vehicle.indices import SMALLEST_DISTANCE, VEHICLES, metrics
 from orchestrator.vehicle.signals import Loop, real_parameter
 
-#: A page holds so many numbers, of all runs together: of longer ones fewer rows.
+#: Most numbers in a page, of all runs together; rows of longer runs are skipped.
 _NUMBERS = 800_000
 
-#: A column whose range is a smaller share of its values than this needs doubles.
+#: Share of its values below which a column's range needs doubles.
 _NARROW = 1e-3
 
-#: What there is to see of a vehicle, and what it needs.
+#: Parts of the page about a vehicle, and the columns that they need.
 _SHOWN = {
     "path": Loop.for_control_point,
     "tracking errors": Loop.for_tracking,
@@ -35,7 +36,7 @@ class Stored(NamedTuple):
 
     Attributes:
         run: its label, rows and vehicles.
-        metrics: what metrics.json holds, as far as it is there.
+        metrics: content of metrics.json; empty: there is none.
 
     """
 
@@ -46,29 +47,29 @@ class Stored(NamedTuple):
 def view_page(
     title: str, stored: Sequence[Stored], hear: Callable[[str], None] = lambda line: None
 ) -> str:
-    """Write the page of a run, and of the one that it is compared with.
+    """Make the page of a run and of its comparison.
 
     Args:
         title: heading.
-        stored: the runs, with different labels.
+        stored: runs with different labels.
         hear: called with a line before a part of the page is made, which may take minutes.
 
     Raises:
         InputError: a parameter is not a number, or a part of the page cannot be made.
 
     """
-    vehicles = [_vehicles(one.run) for one in stored]
+    vehicles = [_vehicles(each.run) for each in stored]
     n = len(vehicles[0])
-    # Vehicles of one run stand for those of the other.
-    pairs = [(one, loops) for one, loops in zip(stored, vehicles, strict=True) if len(loops) == n]
-    names = [_columns(one.run.result, loops) for one, loops in pairs]
-    times = _times([one.run.result for one, _ in pairs], sum(map(len, names)))
+    # Charts compare vehicle by vehicle, so runs with another number of vehicles are left out.
+    pairs = [(each, loops) for each, loops in zip(stored, vehicles, strict=True) if len(loops) == n]
+    names = [_columns(each.run.result, loops) for each, loops in pairs]
+    times = _times([each.run.result for each, _ in pairs], sum(map(len, names)))
     runs, binary = [], []
-    for (one, loops), columns in zip(pairs, names, strict=True):
-        data, content = _packed(one.run.result, columns, times)
-        indices = [_indices(one.metrics, loop) for loop in loops]
+    for (each, loops), columns in zip(pairs, names, strict=True):
+        data, content = _packed(each.run.result, columns, times)
+        indices = [_indices(each.metrics, loop) for loop in loops]
         vehicle = list(map(vehicle_data, loops))
-        runs.append({"label": one.run.label, "vehicles": vehicle, "metrics": indices, **data})
+        runs.append({"label": each.run.label, "vehicles": vehicle, "metrics": indices, **data})
         binary.append(content)
     fleet = vehicles[0] if n > 1 else ()
     data = {
@@ -78,16 +79,16 @@ def view_page(
         "references": reference_colours(fleet),
     }
     if not n:
-        units = {k: v for one, _ in pairs for k, v in one.run.result.header.units.items()}
-        every = dict.fromkeys(name for columns in names for name in columns)
-        data["columns"] = {name: printed_unit(str(units.get(name, ""))) for name in every}
-    notes = [*(_drawn(stored[0].run) if n else ()), *_endings([one.run for one in stored])]
+        units = {k: v for each, _ in pairs for k, v in each.run.result.header.units.items()}
+        shown = dict.fromkeys(chain.from_iterable(names))
+        data["columns"] = {name: printed_unit(str(units.get(name, ""))) for name in shown}
+    notes = [*(_drawn(stored[0].run) if n else ()), *_endings([each.run for each in stored])]
     text = "".join(f"{note}. " for note in notes)
     return assemble("view", data, binary, {"title": title, "notes": text}, hear)
 
 
 def _vehicles(run: Drawn) -> list[Loop]:
-    """The vehicles whose paths are known."""
+    """Return the vehicles whose paths are known."""
     found = [loop for loop in run.loops if not run.result.missing(*loop.for_control_point())]
     for loop in found:
         real_parameter(run.result, loop.ell)
@@ -95,7 +96,7 @@ def _vehicles(run: Drawn) -> list[Loop]:
 
 
 def _drawn(run: Drawn) -> Iterator[str]:
-    """The size of what is drawn, and what is skipped."""
+    """Yield notes on the size of the drawn vehicles and on skipped parts."""
     yield "Vehicles are drawn larger than they are"
     for loop in run.loops:
         of_vehicle = f"{loop.name}: " if len(run.loops) > 1 else ""
@@ -105,7 +106,7 @@ def _drawn(run: Drawn) -> Iterator[str]:
 
 
 def _endings(runs: Sequence[Drawn]) -> Iterator[str]:
-    """The reasons of runs that ended early."""
+    """Yield why runs ended early."""
     for run in runs:
         for text in (run.result.failure, run.result.ending.remark):
             if text:
@@ -113,7 +114,7 @@ def _endings(runs: Sequence[Drawn]) -> Iterator[str]:
 
 
 def _columns(table: Table, loops: Sequence[Loop]) -> list[str]:
-    """The columns that the page shows: of the vehicles, or all."""
+    """Return the columns that the page shows: signals of vehicles, or all if there are none."""
     if not loops:
         return [*table.header.numeric_columns]
     wanted = (
@@ -127,7 +128,7 @@ def _columns(table: Table, loops: Sequence[Loop]) -> list[str]:
 
 
 def _times(tables: Sequence[Table], columns: int) -> np.ndarray:
-    """The times of the rows in the page: of the run that goes on longest."""
+    """Return the times of the rows in the page, from the longest run."""
     longest = max(tables, key=lambda table: table.time[-1])
     n = len(longest)
     rows = np.linspace(0, n - 1, min(n, max(2, _NUMBERS // max(columns, 1))))
@@ -136,12 +137,12 @@ def _times(tables: Sequence[Table], columns: int) -> np.ndarray:
 
 
 def _packed(table: Table, columns: Sequence[str], times: np.ndarray) -> tuple[Plain, bytes]:
-    """A run as data and rows: its columns one after the other, time first.
+    """Return the data of a run, and its columns one after the other, time first.
 
     Args:
-        table: of the run.
-        columns: that are shown.
-        times: at which rows are taken, as far as the run goes.
+        table: rows of the run.
+        columns: columns that are shown.
+        times: times at which rows are taken, up to the end of the run.
 
     """
     time = times[times <= table.time[-1]]
@@ -158,7 +159,7 @@ def _packed(table: Table, columns: Sequence[str], times: np.ndarray) -> tuple[Pl
         "doubles": doubles,
         "singles": singles,
         "parameters": {str(k): v for k, v in header.parameters.items() if _is_number(v)},
-        "happened": [one._asdict() for one in table.ending.events if _is_number(one.time)],
+        "happened": [event._asdict() for event in table.ending.events if _is_number(event.time)],
     }
     wide = b"".join(column.tobytes() for column in (time, *(values[name] for name in doubles)))
     return data, wide + b"".join(values[name].astype("<f4").tobytes() for name in singles)
@@ -170,7 +171,7 @@ def _needs_doubles(column: np.ndarray) -> bool:
 
 
 def _indices(content: Mapping[str, Any], loop: Loop) -> dict[str, list[float | None]]:
-    """The indices of a vehicle in metrics.json, and what there is of all together."""
+    """Return the indices of a vehicle in metrics.json, and the common ones of all vehicles."""
     of_each = content.get(VEHICLES)
     own = of_each.get(loop.name) if isinstance(of_each, Mapping) else None
     found = {**content, **own} if isinstance(own, Mapping) else content
@@ -179,11 +180,11 @@ def _indices(content: Mapping[str, Any], loop: Loop) -> dict[str, list[float | N
 
 
 def _members(value: Any) -> list[float | None]:
-    """The members of an index, without what JSON has no words for."""
+    """Return the members of an index, None for those that JSON has no number for."""
     members = value if isinstance(value, list) else [value]
-    return [one if _is_number(one) else None for one in members]
+    return [member if _is_number(member) else None for member in members]
 
 
 def _is_number(value: object) -> bool:
-    """Whether a value is a number that JSON has words for."""
+    """Tell whether a value is a number that JSON supports."""
     return isinstance(value, int | float) and abs(value) < inf

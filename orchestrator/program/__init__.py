@@ -1,15 +1,13 @@
-"""A system as one compiled program: the same numbers as its FMUs, far sooner.
+"""A system as one compiled program: the same numbers as its FMUs, at many times the speed.
 
-===================  ==============================================================
-module               what it holds
-===================  ==============================================================
-:mod:`.components`   what the authors of its components wrote, found by their FMUs
+===================  ===============================================================
+module               content
+===================  ===============================================================
+:mod:`.components`   definitions of a system's components, found by their FMUs
 :mod:`.kind`         a component in C
-:mod:`.reducing`     indices that look on
-:mod:`.writer`       the text of all of it in C
-:mod:`.events`       what happens between steps
-:mod:`.noise`        whether noise is added to what is measured, and so may be none
-:mod:`.fmu`          the text as one FMU, to a host that knows nothing of components
-:mod:`.library`      the text compiled, kept and called
-===================  ==============================================================
+:mod:`.writer`       a system in C, with its indices and events
+:mod:`.files`        C files for other programs, such as firmware
+:mod:`.fmu`          one FMU of the whole system
+:mod:`.library`      compilation, cache and calls
+===================  ===============================================================
 """

@@ -1,7 +1,7 @@
-"""The components of a system as their authors wrote them, found by their FMUs.
+"""Definitions of the components of a system, found by their FMUs.
 
-An FMU of the bundle is known by its text. One of a user's own says which script it was built from:
-that must be there, and unchanged.
+An FMU of the bundle is recognised by its digest or its equations. A user's FMU contains the name of
+the script that it was built from; this script must exist, unchanged.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from orchestrator.machine.disk import sha256_of
 from orchestrator.machine.errors import InputError, reason, shortened
 from orchestrator.runs.bundle import current_fmus
 
-#: Where a native FMU has its equations.
+#: Path of the equations in a native FMU.
 _EQUATIONS = Path("sources", "equations.c")
 
-#: The files of users' modules and their digests, by the names of the modules.
+#: Files and digests of users' modules that are loaded, by module.
 _loaded: dict[str, tuple[Path, str | None]] = {}
 
 
 def definitions_of(system: System) -> dict[str, Definition]:
-    """The definitions of all components, by their names.
+    """Return the definitions of all components of a system, by component.
 
     Raises:
-        InputError: one is not in the language of equations, or what its FMU was built from is not
-            there; the text says which, and why.
+        InputError: a component is not in the language of equations, or the source of its FMU is
+            missing; the message names the component and the reason.
 
     """
-    found: dict[str, Definition] = {}
+    definitions: dict[str, Definition] = {}
     known: dict[str, Definition] = {}
     for name, component in system.components.items():
         if component.digest not in known:
@@ -49,16 +49,16 @@ def definitions_of(system: System) -> dict[str, Definition]:
                 raise InputError(f"{name}: is not in the language of equations: {first}") from None
             except (Misdeclared, InputError) as error:
                 raise InputError(f"{name}: {error}") from None
-        found[name] = known[component.digest]
-    return found
+        definitions[name] = known[component.digest]
+    return definitions
 
 
 def _definition(component: Component) -> Definition:
-    """The definition that an FMU was made from.
+    """Return the definition that an FMU was made from.
 
     Raises:
         InputError: there is none, or it has changed.
-        Misdeclared, Untranslatable: it is none any more.
+        Misdeclared, Untranslatable: the changed source is not a valid definition.
 
     """
     model = str(component.description.modelName)
@@ -77,20 +77,20 @@ def _definition(component: Component) -> Definition:
 
 
 def _is_made_from(component: Component, definition: Definition) -> bool:
-    """Whether an FMU of the bundle has the equations of a definition."""
+    """Tell whether an FMU of the bundle has the equations of a definition."""
     equations = component.folder / _EQUATIONS
     kind = NATIVE if equations.is_file() else PYTHON
     if component.digest == sha256_of(current_fmus(kind) / f"{definition.name}.fmu"):
         return True
-    # One for other platforms, or another version of FMI.
+    # FMUs for other platforms, or another version of FMI, have the same equations.
     return kind == NATIVE and equations.read_text(encoding="utf-8") == translated(definition)
 
 
 def _own(component: Component, origin: Origin) -> Definition:
-    """The definition of a component of the user's own.
+    """Return the definition of a user's component.
 
     Raises:
-        InputError: its script is not there, has changed, or is no component.
+        InputError: its script is missing, has changed, or is not a component in the language.
 
     """
     fmu = component.fmu
@@ -107,14 +107,14 @@ def _own(component: Component, origin: Origin) -> Definition:
         raise InputError(
             f"{script.name} is a slave of PythonFMU, and not in the language of equations"
         )
-    return define(name_of(script.stem), load(script))
+    return define(name_of(script.stem), _load(script))
 
 
-def load(script: Path) -> ModuleType:
-    """Load a user's module, from its text, with those beside it that it imports.
+def _load(script: Path) -> ModuleType:
+    """Load a user's module from its source, with the modules in its folder that it imports.
 
     Raises:
-        InputError: it fails, or its name is that of a module of Python.
+        InputError: it raises an exception, or a module of Python has the same name.
 
     """
     folder, name = script.resolve().parent, script.stem
@@ -131,15 +131,15 @@ def load(script: Path) -> ModuleType:
     finally:
         sys.path.remove(str(folder))
         sys.dont_write_bytecode = writes
-        for other, found in [*sys.modules.items()]:
-            file = getattr(found, "__file__", None)
+        for other, loaded in [*sys.modules.items()]:
+            file = getattr(loaded, "__file__", None)
             if file is not None and other not in _loaded and folder in Path(file).parents:
                 _loaded[other] = Path(file), digest_at(Path(file))
     return module
 
 
 def _forget_others(folder: Path) -> None:
-    """Forget modules that have changed, and those of other folders with names that one has."""
+    """Unload modules that have changed, or that modules of this folder would be mistaken for."""
     for name, (path, digest) in [*_loaded.items()]:
         top = folder / name.partition(".")[0]
         is_other = folder not in path.parents and (top.is_dir() or top.with_suffix(".py").is_file())

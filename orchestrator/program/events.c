@@ -1,16 +1,16 @@
-/* What happens to a run from outside, between two steps: see orchestrator/cosim/events.py.
+/* Events, which change a run between two steps: see orchestrator/cosim/events.py.
  *
- * The host gives what is to happen as numbers, with zeros where this keeps how far it has come.
- * Several events may act on one input or parameter: the latest counts, and when it ends, the one
- * before it counts again.
+ * The host passes events and actions as numbers. Their state, which begins with zeros, is kept in
+ * the same arrays. Several events may act on one input or parameter: the latest one counts, and
+ * when it ends, the one before it counts again.
  */
 
 typedef struct {
-    double is_timed, at;              /* whether it comes at a time, and which [s] */
-    double column, comparison, value; /* or else its condition, on a column of the row */
-    double repeats;
-    double lasts; /* for how long [s]; 0: for good */
-    double first, last; /* its actions, without the last */
+    double is_timed, at;              /* if set, it happens at this time [s] */
+    double column, comparison, value; /* otherwise when this condition on a row becomes true */
+    double repeats;                   /* if set, it happens each time that it becomes true */
+    double lasts;                     /* duration [s]; 0: until the run ends */
+    double first, last;               /* its actions: from the first to before the last */
     double has_happened, was_false, end, listed;
 } event;
 
@@ -18,40 +18,40 @@ typedef struct {
     double kind;
     double place; /* an input, a parameter, or a component, by its number */
     double value;
-    double turn; /* which of all that act it is: the latest counts; 0: it does not act */
+    double turn; /* rank among active actions, the latest highest; 0: inactive */
 } action;
 
 enum { OVERRIDE, BIAS, FREEZE, RELEASE, SET_VALUE, RESET, END };
 enum { BELOW, AT_MOST, ABOVE, AT_LEAST };
 enum { WELL, REFUSED, ENDED };
 
-/* After more steps than any run has. */
+/* More steps than any run has. */
 enum { NEVER = 1000000001 };
 
-/* How often the same event is listed, and the numbers of each time. */
+/* Most entries of the same event in the list, and numbers of an entry. */
 enum { MOST_LISTED = 1000, LISTED = 3 };
 
-/* What is to happen to a run. */
+/* The events of a run. */
 typedef struct {
     simulation *it, *ahead;
-    int is_ahead;             /* whether the values of now have passed there */
-    const double *parameters; /* that it began with */
+    int is_ahead;             /* if set, current values have been passed on in `ahead` */
+    const double *parameters; /* at the start of the run */
     int n;
     event *events;
     action *actions;
-    double *happened; /* how often something has, then of each time: event, step, whether it ends */
-    double turn;
+    double *happened; /* number of entries, then of each entry: event, step, 1 if it ends */
+    double turn;      /* highest rank so far */
 } course;
 
-/* Lets an input take what feeds it, or what it would have, in another way. */
+/* Sets the factor and offset of an input, for its connection or its own value. */
 static void alter(simulation *it, int i, double factor, double offset) {
     it->factors[i] = factor;
     it->offsets[i] = offset;
     if (!inputs[i].is_fed) put(it, columns[inputs[i].column], factor * it->supplied[i] + offset);
 }
 
-/* Gives a tunable parameter, or an input that nothing feeds, a value in its range; whether the
- * component refuses. */
+/* Sets a tunable parameter or an unconnected input to a value in its range. Returns REFUSED if the
+ * component refuses it. */
 EXPORTED int set(simulation *it, int which, double value) {
     const settable *of = &settables[which];
     const double before = get(it, of->at);
@@ -69,9 +69,9 @@ EXPORTED int set(simulation *it, int which, double value) {
     return WELL;
 }
 
-/* Looking at values of now */
+/* Current values */
 
-/* Lets values of now pass in a copy of the simulation, unless they have. */
+/* Passes current values on in a copy of the simulation, once. */
 static int look_ahead(course *of) {
     if (!HAS_PASSING || of->is_ahead) return WELL;
     *of->ahead = *of->it;
@@ -108,7 +108,7 @@ static int n_actions(const course *of) {
     return of->n > 0 ? (int)of->events[of->n - 1].last : 0;
 }
 
-/* The latest action at the place of one, before that one in its turn; NULL: there is none. */
+/* Returns the latest action at the same place with a lower rank; NULL: none. */
 static action *below(const course *of, const action *one) {
     action *found = NULL;
     for (int i = 0; i < n_actions(of); i++) {
@@ -127,7 +127,7 @@ static int is_top(const course *of, const action *one) {
     return below(of, &last) == one;
 }
 
-/* Does what an action says at its place. */
+/* Applies an action to its place. */
 static int apply(course *of, const action *one) {
     const int i = (int)one->place;
     of->is_ahead = 0;
@@ -139,7 +139,7 @@ static int apply(course *of, const action *one) {
     }
 }
 
-/* Undoes what an action does, if it counts: the one before it counts again, or what there was. */
+/* Ends an action. If it was the latest, the one before it, or the original value, counts again. */
 static int undo(course *of, action *one) {
     const int i = (int)one->place, counts = is_top(of, one);
     const action *other = below(of, one);
@@ -177,19 +177,19 @@ static int reset(course *of, int component) {
     return found;
 }
 
-/* When events happen */
+/* Times of events */
 
 static double rounded(double n) {
     const double whole = nearest(n);
     return fabs(n - whole) <= fmin(1e-9 * whole, 1e-3) ? whole : n;
 }
 
-/* After how many steps a time has come: the first t_k that is not before it. */
+/* Returns the number of steps after which a time is reached: the first t_k that is not before. */
 static int reaching(const simulation *it, double time) {
     return (int)ceil(rounded(fmin(fmax((time - it->start_time) / it->step, 0.0), NEVER)));
 }
 
-/* After how many steps to look at an event. */
+/* Returns the number of steps after which to examine an event. */
 static int due(const course *of, const event *one) {
     if (one->has_happened != 0.0 && one->repeats == 0.0) return NEVER;
     return one->is_timed != 0.0 ? reaching(of->it, one->at) : of->it->made + 1;
@@ -204,7 +204,7 @@ static void list(course *of, event *one, int ends) {
     *of->happened += 1.0;
 }
 
-/* Whether an event begins now, in `found`. */
+/* Sets `found` to 1 if an event begins now, else to 0. */
 static int find_begin(course *of, event *one, int *found) {
     const int at = due(of, one);
     *found = at <= of->it->made;
@@ -248,7 +248,7 @@ static int end_event(course *of, event *one) {
     return WELL;
 }
 
-/* Ends what ends now, then begins what begins now. */
+/* Ends the events that end now, then begins those that begin now. */
 static int act(course *of) {
     simulation *it = of->it;
     it->due = NEVER;
@@ -271,16 +271,17 @@ static int act(course *of) {
     return WELL;
 }
 
-/* Completes the row of now, which no step follows. */
+/* Completes the current row, which no step follows. */
 static void show_last(simulation *it, double rows[]) {
     if (it->shown > it->made || PASS(it, it->made, time_after(it, it->made))) return;
     keep(it, it->made, rows);
 }
 
-/* Makes steps as `run` does, while events happen; whether a component refuses, or an event ends the
- * run.
+/* Makes steps as `run` does, with events. Returns WELL, REFUSED if a component refuses, or ENDED if
+ * an event ends the run.
  *
- * `ahead` is room for another simulation; `happened` has room for MOST_LISTED times of each event.
+ * `ahead` is memory for another simulation; `happened` has room for MOST_LISTED entries of each
+ * event.
  */
 EXPORTED int run_with_events(simulation *it, simulation *ahead, int until, double rows[],
                              const double begun_with[], int n, event events[], action actions[],

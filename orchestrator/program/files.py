@@ -1,7 +1,7 @@
-"""A whole system as C files for a program of one's own, such as the firmware of a controller.
+"""A whole system as C files for use in another program, such as the firmware of a controller.
 
-`NAME.h` and `NAME.c` are the program: no input or output, no allocation, no global variables; what
-others link against begins with NAME. `NAME_main.c` runs the scenario and prints its table.
+`NAME.h` and `NAME.c` are the program. It has no input or output, no allocation and no global
+variables; its public names begin with NAME. `NAME_main.c` runs the scenario and prints its table.
 """
 
 from __future__ import annotations
@@ -19,72 +19,65 @@ from fmus.language.types import FLOAT, count
 from fmus.native.emit import closed, number_in_c, quoted
 from fmus.native.pieces import array, function
 from fmus.native.translator import deepest
-from fmus.ports.definition import Definition
 from orchestrator.cosim import Plan, PortName
 from orchestrator.machine.errors import InputError
+from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import CALLS, Text, Unsupported, head_of
 
-#: What the calls that a component can refuse are, in words.
+#: Descriptions of the calls that a component can refuse.
 _REFUSED = ("its parameters", "its inputs", "its outputs", "its step", "a value")
 
-#: The bytes of numbers, and what their addresses are multiples of.
+#: Sizes and alignments of numbers.
 _NUMBERS = {"double": (8, 8), "float": (4, 4), "int": (4, 4), "uint32_t": (4, 4), "char": (1, 1)}
 
-#: Structures, their members, and constants.
+#: Structures in C, their members, and constants.
 _STRUCTURE = re.compile(r"^typedef struct \{\n(.*?)\n\} (\w+);", re.MULTILINE | re.DOTALL)
 _MEMBERS = re.compile(r"^ +(\w+) ([\w\[\], ]+);", re.MULTILINE)
 _COUNT = re.compile(r"\b([A-Z_]+) = (\d+)\b")
 
-#: A function or a constant that other files do not see, with the comment before it.
-_OWN = re.compile(
+#: A static function or constant, with the comment before it.
+_STATIC = re.compile(
     r"(?:^/\*(?:(?!\*/).)*\*/\n)?^static (?:"
     r"(?:inline )?[\w ]+[ *](?P<function>\w+)\([^(){}]*\) \{(?: [^\n]* \}|\n.*?^\})"
     r"|const \w+ (?P<constant>\w+)(?:\[\w*\])? = [^;]*;)\n\n?",
     re.MULTILINE | re.DOTALL,
 )
 
-#: What is no code.
-_SAID = re.compile(r"/\*.*?\*/|\"(?:\\.|[^\"\\])*\"", re.DOTALL)
+#: Comments and texts.
+_TEXTS = re.compile(r"/\*.*?\*/|\"(?:\\.|[^\"\\])*\"", re.DOTALL)
 
-#: Functions of C that programs call besides those of Python, and those that take either precision.
+#: Functions of C in addition to Python's, and macros that take either precision.
 _OTHERS, _GENERIC = ("fmin", "fmax", "round"), ("isfinite", "isinf", "isnan")
 
-#: Comments and texts, which stay as they are, and the words of double precision.
+#: Comments and texts, which are kept, and the words of double precision.
 _DOUBLES = re.compile(
-    rf"(?P<kept>{_SAID.pattern})"
+    rf"(?P<kept>{_TEXTS.pattern})"
     r"|(?P<type>\bdouble\b)|(?P<limit>\bDBL_MAX\b)"
     r"|(?P<number>(?<![\w.])(?:\d+\.\d*(?:e[-+]?\d+)?|\d+e[-+]?\d+)(?![\w.]))"
     rf"|\b(?P<called>{'|'.join([*FUNCTIONS, *_OTHERS])})(?=\()",
     re.DOTALL,
 )
 
-#: The smallest and the largest number of single precision.
+#: Smallest normal and largest numbers of single precision.
 _LEAST, _MOST = 1.1754943508222875e-38, 3.4028234663852886e38
 
-#: Up to which whole number it has all of them, and double precision.
+#: Largest numbers up to which single and double precision have all whole numbers.
 _ALL_WHOLE, _ALL_OF_DOUBLE = 2**24, 2**53
 
-#: Where double precision is taken for granted, and what stands there in single precision.
+#: Passages that assume double precision, and their replacement in single precision.
 _PASSAGES = {
-    # The largest int is rounded to what no int can be.
+    # In single precision, INT_MAX is rounded to a number that is not an int.
     "x <= INT_MAX": "x < 2147483648.0",
-    # How far a step may exceed the largest internal one.
+    # Tolerance of a step that exceeds the largest internal one.
     "(1.0 + 1e-09)": "(1.0 + 1e-06)",
-    # Up to where values that go on changing at the start are taken to rest.
+    # Tolerance of values at rest at the start.
     "1e-12 + 1e-12 * fabs(before)": "1e-06 + 1e-06 * fabs(before)",
     """\
-/* Uniform in [0, 1), with 53 bits. */
-static double uniform(generator *it) {
-    uint32_t upper = next_word(it) >> 5, lower = next_word(it) >> 6;
+    uint32_t upper = tempered(x[0]) >> 5, lower = tempered(x[1]) >> 6;
     return (upper * 67108864.0 + lower) * (1.0 / 9007199254740992.0);
-}
 """: """\
-/* Uniform in [0, 1), with the first 24 of Python's 53 bits. */
-static double uniform(generator *it) {
-    uint32_t upper = next_word(it) >> 8;
-    (void)next_word(it);
-    return upper * (1.0 / 16777216.0);
-}
+    /* In single precision, the first 24 of Python's 53 bits: all would be rounded to 1. */
+    return (tempered(x[0]) >> 8) * (1.0 / 16777216.0);
 """,
 }
 
@@ -104,9 +97,9 @@ _HEADER = """\
  *         ... row[{column}] ...
  *     }}
  *
- * The whole run is in its simulation, and there can be several. Nothing is allocated or printed.
- * Up to {stack} bytes of structures are on the stack at once, or up to twice as many where a
- * compiler inlines functions; the C library takes more.
+ * A simulation holds a whole run; there can be several. Nothing is allocated or printed.
+ * Up to {stack} bytes of structures are on the stack at once, or twice as many if the compiler
+ * inlines functions; the C library takes more.
  */
 #ifndef {NAME}_H
 #define {NAME}_H
@@ -120,45 +113,45 @@ extern "C" {{
 #define {NAME}_STEP {step}
 #define {NAME}_STOP_TIME {stop_time}
 
-/* Steps of the scenario, and how many of them are not shorter; bytes of a simulation. */
+/* Number of steps, number of steps of full length, and bytes of a simulation. */
 enum {{ {NAME}_STEPS = {steps}, {NAME}_FULL_STEPS = {full_steps}, {NAME}_BYTES = {bytes} }};
 
 /* Components. */
 {members}
 
-/* Parameters, and inputs that nothing feeds: what they are in the scenario. */
+/* Parameters and unconnected inputs, with their values in the scenario. */
 {parameters}
 
 /* Columns of a row: the time, and all inputs and outputs. */
 {columns}
 
-/* Memory for a run. */
+/* Memory of a run. */
 typedef union {{
     {real} number;
     unsigned char bytes[{NAME}_BYTES];
 }} {name}_simulation;
 
-/* Which component has refused a call, and which input, counted within the component. Where the
- * component is -1, values do not come to rest at the start. */
+/* A refused call: its component, and the input, counted within the component. If the component is
+ * -1, values do not come to rest at the start. */
 typedef struct {{
     int component, call, input;
-    int steps; /* that were made before */
+    int steps; /* made before */
 }} {name}_refusal;
 
 enum {{ {calls} }};
 
-/* The parameters of the scenario, for those who want to change some. */
+/* Give the parameters of the scenario, for example to change some. */
 void {name}_defaults({real} parameters[]);
 
-/* Begin a run of so many steps: set parameters, by default the scenario's, and let values come to
- * rest. INT_MAX steps have no end. 0, or 1 where a component refuses. */
+/* Begin a run: set parameters (NULL: the scenario's) and settle values. A run of INT_MAX steps has
+ * no end. Returns 0, or 1 if a component refuses. */
 int {name}_begin({name}_simulation *simulation, const {real} parameters[], int steps);
 
-/* Give the row of the time that has come, unless it is NULL, and make the step after it; at the end
- * of the run there is none. 0, or 1 where a component refuses: then only another begin helps. */
+/* Write the current row, unless it is NULL, and make the next step, unless the run is at its end.
+ * Returns 0, or 1 if a component refuses: then begin again. */
 int {name}_step({name}_simulation *simulation, {real} row[]);
 
-/* Say what was refused. */
+/* Return the refusal. */
 {name}_refusal {name}_failure(const {name}_simulation *simulation);
 
 #ifdef __cplusplus
@@ -211,7 +204,7 @@ int {name}_step({name}_simulation *memory, {real} row[]) {{
 _MAIN = """\
 /* Run the scenario of {name}.h and print its table, with commas between the numbers.
  *
- * Compile it with -DSTEPS=500 for other many steps.
+ * Compile it with -DSTEPS=500 for another number of steps.
  */
 #include <stdio.h>
 
@@ -255,26 +248,24 @@ int main(void) {{
 
 
 _CHECKS = """\
-/* An int of 16 bits will not do, nor structures with more room between numbers. */
+/* An int needs 32 bits, and structures must not be larger than assumed. */
 typedef char int_has_32_bits[INT_MAX >= 2147483647 ? 1 : -1];
 typedef char simulation_fits[sizeof(simulation) <= {NAME}_BYTES ? 1 : -1];"""
 
 
 @dataclass
 class ProgramFiles:
-    """The files of a system.
+    """C files of a system.
 
     Attributes:
-        plan: of the run that the program makes.
-        definitions: of the components, by their names.
-        name: of the files, and what all public names begin with.
-        title: one line about it.
-        is_single: whether it has single precision.
+        plan: plan of the run.
+        name: name of the files, and prefix of all public names.
+        title: one line about the system.
+        is_single: if set, numbers have single precision.
 
     """
 
     plan: Plan
-    definitions: Mapping[str, Definition]
     name: str
     title: str
     is_single: bool = False
@@ -283,10 +274,10 @@ class ProgramFiles:
         """Translate the equations.
 
         Raises:
-            InputError: it cannot be one program; the text says why.
+            InputError: the system cannot be one program, with the reason.
 
         """
-        self.text = Text(self.plan, self.definitions)
+        self.text = Text(self.plan, definitions_of(self.plan.system))
         self.name = re.sub(r"\W", "_", self.name, flags=re.ASCII)
         self.name = self.name if self.name[0].isalpha() else f"of_{self.name}"
         self._upper = self.name.upper()
@@ -294,17 +285,17 @@ class ProgramFiles:
         self._columns = self._constants("COLUMN", ["time", *self.text.columns])
 
     def _constants(self, what: str, names: Iterable[object]) -> dict[str, str]:
-        """What names are called in C."""
-        found: dict[str, str] = {}
+        """Return names of constants in C, distinct, by the given names."""
+        constants: dict[str, str] = {}
         for name in map(str, names):
-            one = f"{self._upper}_{what}_{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_')}"
-            while one in found.values():
-                one += "_"
-            found[name] = one
-        return found
+            constant = f"{self._upper}_{what}_{re.sub(r'[^A-Za-z0-9]+', '_', name).strip('_')}"
+            while constant in constants.values():
+                constant += "_"
+            constants[name] = constant
+        return constants
 
     def files(self) -> dict[str, str]:
-        """Their texts by their names."""
+        """Return the texts of the files by name."""
         main = self._filled(
             _MAIN,
             components=array("char *const components", map(quoted, self.text.components)),
@@ -324,23 +315,23 @@ class ProgramFiles:
         return form.format(name=self.name, NAME=self._upper, real=real, **given)
 
     def _precise(self, text: str) -> str:
-        """A text in the precision that is wanted."""
+        """Return a text in the wanted precision."""
         return in_single(text) if self.is_single else text
 
     # The header
 
     def _header(self) -> str:
         experiment, text = self.plan.experiment, self.text
-        about = (f"{name}: {self.definitions[name].summary}" for name in text.components)
+        summaries = (f"{name}: {text.definitions[name].summary}" for name in text.components)
         members = self._constants("COMPONENT", text.components)
         columns = dict(
             zip(self._columns.values(), ["", *map(self._about, text.columns)], strict=True)
         )
         values = dict(zip(self.parameters.values(), map(self._value, text.parameters), strict=True))
-        found = self._filled(
+        header = self._filled(
             _HEADER,
             title=closed(self.title),
-            components="\n".join(f" * {closed(one)}" for one in about),
+            components="\n".join(f" * {closed(summary)}" for summary in summaries),
             column=[*columns][-1],
             stack=self.stack,
             start_time=number_in_c(experiment.start_time),
@@ -354,30 +345,30 @@ class ProgramFiles:
             columns=self._enum("COLUMNS", columns),
             calls=", ".join(f"{self._upper}_{call}" for call in CALLS),
         )
-        return self._precise(found)
+        return self._precise(header)
 
     def _enum(self, total: str, constants: Mapping[str, str]) -> str:
-        """Constants with what is said of each, and how many there are."""
+        """Return an enumeration of constants with comments, ended by their number."""
         rows = [
-            f"    {name},{f' /* {said} */' if said else ''}" for name, said in constants.items()
+            f"    {name},{f' /* {text} */' if text else ''}" for name, text in constants.items()
         ]
         return "\n".join(["enum {", *rows, f"    {self._upper}_{total}", "};"])
 
     def _about(self, name: PortName) -> str:
-        port = self.text.port(name)
+        port = self.text.ports[name]
         return closed(f"{port.description} [{port.unit}]" if port.unit else port.description)
 
     def _value(self, name: PortName) -> str:
-        """What a parameter is about, and what it is."""
+        """Return the description of a parameter with its value."""
         value = self.text.start(name)
-        words = [word for word, one in self.text.port(name).choices.items() if one == value]
+        words = [word for word, item in self.text.ports[name].choices.items() if item == value]
         return closed(f"{self._about(name)}: {' '.join([number_in_c(value), *words])}")
 
     # The program
 
     @cached_property
     def program(self) -> str:
-        """The file NAME.c."""
+        """Text of NAME.c."""
         text = self.text
         _, *core = text.core()
         values = [
@@ -411,8 +402,8 @@ class ProgramFiles:
                 passing="    if (pass(it, k, t, &noted)) return 1;\n" * text.passes,
             ),
         ]
-        found = re.sub(r"^APART ", "static ", "\n\n".join(parts), flags=re.MULTILINE)
-        return self._precise(_without_unused(found))
+        program = re.sub(r"^APART ", "static ", "\n\n".join(parts), flags=re.MULTILINE)
+        return self._precise(_without_unused(program))
 
     def _number(self, name: PortName) -> float:
         value = self.text.start(name)
@@ -423,12 +414,12 @@ class ProgramFiles:
             )
         return float(value)
 
-    # What it takes
+    # Memory
 
     @cached_property
     def sizes(self) -> dict[str, int]:
-        """The bytes of each structure, if each number is at a multiple of its own size."""
-        code = _SAID.sub("", self.program)
+        """Bytes of each structure, if each number is at a multiple of its own size."""
+        code = _TEXTS.sub("", self.program)
         counts = {name: int(n) for name, n in _COUNT.findall(code)}
         known = dict(_NUMBERS)
         for body, name in _STRUCTURE.findall(code):
@@ -436,15 +427,15 @@ class ProgramFiles:
             for type_, names in _MEMBERS.findall(body):
                 size, alignment = known[type_]
                 widest = max(widest, alignment)
-                for one in names.split(", "):
-                    n = re.search(r"\[(\w+)\]", one)
+                for member in names.split(", "):
+                    n = re.search(r"\[(\w+)\]", member)
                     at += -at % alignment + size * (int(counts.get(n[1], n[1])) if n else 1)
             known[name] = at + -at % widest, widest
         return {name: size for name, (size, _) in known.items()}
 
     @cached_property
     def stack(self) -> int:
-        """How many bytes of the stack a call takes at most."""
+        """Most bytes of the stack that a call takes."""
         number = 4 if self.is_single else 8
         emitter = self.text.emitter
         equations = deepest(emitter.names, emitter.shared)[0] * number // 8
@@ -456,7 +447,7 @@ class ProgramFiles:
 
 
 def write_files(program: ProgramFiles, folder: Path) -> list[Path]:
-    """Write the files of a program into a folder."""
+    """Write the files of a program into a folder, and return their paths."""
     written = []
     for name, text in program.files().items():
         path = folder / name
@@ -466,12 +457,12 @@ def write_files(program: ProgramFiles, folder: Path) -> list[Path]:
 
 
 def in_single(text: str) -> str:
-    """A program in single precision: its types, numbers and functions.
+    """Convert the types, numbers and functions of a program to single precision.
 
-    Numbers beyond its range become its largest, or its smallest with all digits.
+    Numbers beyond its range become its largest, or its smallest normal number.
 
     Raises:
-        Unsupported: it counts with whole numbers that single precision does not have.
+        Unsupported: the program counts with whole numbers that single precision does not have.
 
     """
     for double, single in _PASSAGES.items():
@@ -479,8 +470,8 @@ def in_single(text: str) -> str:
     return _DOUBLES.sub(_single, text)
 
 
-def _single(found: re.Match[str]) -> str:
-    kind, text = str(found.lastgroup), found[0]
+def _single(match: re.Match[str]) -> str:
+    kind, text = str(match.lastgroup), match[0]
     if kind == "number":
         value = float(text)
         if value.is_integer() and _ALL_WHOLE < value < _ALL_OF_DOUBLE and _rounded(value) != value:
@@ -496,18 +487,18 @@ def _single(found: re.Match[str]) -> str:
 
 
 def _rounded(value: float) -> float:
-    """The nearest number of single precision."""
+    """Round to the nearest number of single precision."""
     return float(struct.unpack("f", struct.pack("f", value))[0])
 
 
 def _without_unused(text: str) -> str:
-    """A program without functions and constants that it does not use."""
+    """Remove static functions and constants that a program does not use."""
     before = ""
     while text != before:
-        before, words = text, Counter(re.findall(r"\w+", _SAID.sub("", text)))
-        text = _OWN.sub(partial(_used, words), text)
+        before, words = text, Counter(re.findall(r"\w+", _TEXTS.sub("", text)))
+        text = _STATIC.sub(partial(_used, words), text)
     return text
 
 
-def _used(words: Mapping[str, int], found: re.Match[str]) -> str:
-    return found[0] if words[found["function"] or found["constant"]] > 1 else ""
+def _used(words: Mapping[str, int], match: re.Match[str]) -> str:
+    return match[0] if words[match["function"] or match["constant"]] > 1 else ""

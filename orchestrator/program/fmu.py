@@ -1,11 +1,11 @@
 """A whole system as one native FMU: its program, called by the runtime of FMUs.
 
-To the runtime it is one component. Its open inputs are the inputs, all outputs the outputs, all
-parameters the parameters. The state at a communication point is what components have before values
-pass; what passes follows from that and from the inputs, and a step begins with it. So
+For the runtime, the system is one component, with the system's open inputs, all outputs and all
+parameters. Its state at a communication point is what the components have before values are passed
+along connections; the passed values follow from the state and the inputs:
 
-    derived = the whole simulation, after values have passed
-    outputs = those of derived
+    derived = the whole simulation, after values were passed
+    outputs = outputs of derived
     update  = one communication step of derived
 
 A step of the host that is longer than the system's is split evenly.
@@ -31,7 +31,7 @@ from fmus.native.packaging import Parts, entries_of
 from fmus.native.pieces import array, function, has_only_doubles, moves, structure
 from fmus.native.tables import places_of, port_tables
 from fmus.native.translator import constants, defined
-from fmus.ports.definition import DefaultExperiment, Definition, Model, Origin, check_enumerations
+from fmus.ports.definition import DefaultExperiment, Model, Origin, check_enumerations
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, largest_step
 from fmus.ports.terminals import terminals_of
@@ -40,6 +40,7 @@ from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.compilers import platforms as platforms_of
 from orchestrator.machine.disk import file_name
 from orchestrator.machine.errors import InputError, reason
+from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import Text, Unsupported
 
 _NOISE = """\
@@ -61,11 +62,11 @@ static void model_take_noise(generator *noise, const double from[]) {
 }
 """
 
-#: The numbers of a generator as the state has them: words, place, whether there is a next, and it.
+#: Types of a generator's numbers in the state: words, place, `has_next` and `next`.
 _NOISE_TYPES = (*[int] * 625, bool, float)
 
-_TOLD = """\
-/* Says whose an error is. */
+_ERRORS = """\
+/* Puts the name of a component before an error. */
 static void model_ascribe(Error *error, string component) {
     const message why = error->why;
     if (!error->raised) return;
@@ -96,10 +97,10 @@ _PUT, _TAKE, _SET, _FEED, _RENEW = (
 _CONSTANTS = """\
 #define SYSTEM_STEP {step}
 
-/* Whether only steps of this length can be made, and after how many all components step. */
+/* 1 if only steps of this length can be made, and steps after which all components have stepped. */
 enum {{ ONLY_SYSTEM_STEPS = {is_slow}, SYSTEM_CYCLE = {cycle} }};"""
 
-#: What some functions do that the runtime calls.
+#: Bodies of functions that the runtime calls.
 _START = """\
 simulation *it = calloc(1, sizeof *it);
 int found;
@@ -136,7 +137,7 @@ _PASS = "if (pass(it, it->made, t, error)) model_tell(it, error);"
 
 _UPDATE = f"""\
 simulation *it = &derived->it;
-/* Hosts that subtract times have steps that nearly are the system's. */
+/* Hosts that subtract times make steps that differ from the system's by rounding errors. */
 it->step = fabs(h - SYSTEM_STEP) <= SYSTEM_STEP * {euler.ROUNDING!r} ? SYSTEM_STEP : h;
 if (ONLY_SYSTEM_STEPS && it->step != SYSTEM_STEP) {{
     raise_error(error, "step %g s: only steps of %g s can be made", h, SYSTEM_STEP);
@@ -186,12 +187,12 @@ _FIXED = "others are refused, because {slow} makes longer steps than the others.
 
 
 class Part(NamedTuple):
-    """Some numbers of the state.
+    """A part of the state.
 
     Attributes:
-        owner: what holds them, in C.
-        type: of it; None: it is a generator of noise.
-        types: of the numbers, in Python.
+        owner: the value in C.
+        type: its type; None: it is a generator of noise.
+        types: types of its numbers in Python.
 
     """
 
@@ -200,21 +201,21 @@ class Part(NamedTuple):
     types: Sequence[Any]
 
     def put(self, at: int) -> list[str]:
-        """Statements that move them into the state, from a place on."""
+        """Return statements that copy the part into the state, from a place on."""
         block = "memcpy(to + {at}, &{owner}, sizeof {owner});"
         return self._moved(
             at, "model_put_noise(&{owner}, to + {at});", block, "to[{place}] = {member};"
         )
 
     def take(self, at: int) -> list[str]:
-        """Statements that move them from there."""
+        """Return statements that copy the part from the state."""
         block = "memcpy(&{owner}, from + {at}, sizeof {owner});"
         return self._moved(
             at, "model_take_noise(&{owner}, from + {at});", block, "{member} = {cast}from[{place}];"
         )
 
     def _moved(self, at: int, generator: str, block: str, each: str) -> list[str]:
-        """Statements of one of three forms: of a generator, of a block, and of each number."""
+        """Return statements in one of three forms: for a generator, a block, or each number."""
         if self.type is None:
             return [generator.format(owner=self.owner, at=at)]
         if not isinstance(self.type, Scalar) and has_only_doubles(self.type):
@@ -223,117 +224,108 @@ class Part(NamedTuple):
 
 
 class SystemModel:
-    """A system as a model of FMI.
+    """A system as an FMI model.
 
     Attributes:
         text: its program.
-        name: of the model.
+        name: name of the model.
 
     """
 
-    def __init__(
-        self, plan: Plan, definitions: Mapping[str, Definition], name: str, title: str
-    ) -> None:
-        """Look at the system of a plan.
+    def __init__(self, plan: Plan, name: str, title: str) -> None:
+        """Translate the system of a plan.
 
         Args:
-            plan: of the run that the FMU makes.
-            definitions: of the components, by their names.
-            name: of the model.
-            title: one line about it.
+            plan: plan of the FMU's run.
+            name: name of the model.
+            title: one line about the system.
 
         Raises:
-            InputError: it cannot be one FMU; the text says why.
+            InputError: the system cannot be one FMU, with the reason.
 
         """
-        self.text, self.name = Text(plan, definitions, is_tuned=True, is_hosted=True), name
-        self.plan, self._definitions, self._title = self.text.plan, definitions, title
-        system = self.plan.system
-        #: The ports of the components.
-        self._known = {
-            PortName(name, port.name): port
-            for name in system.components
-            for port in definitions[name].ports
-        }
-        fed = {connection.target for connection in system.connections}
-        #: The inputs that nothing feeds.
+        definitions = definitions_of(plan.system)
+        self.text = Text(plan, definitions, is_tuned=True, is_hosted=True)
+        self.plan, self.name, self._title = self.text.plan, name, title
+        fed = {connection.target for connection in self.plan.system.connections}
+        #: Unconnected inputs.
         self._open = [
             name
-            for name, port in self._known.items()
+            for name, port in self.text.ports.items()
             if port.causality == "input" and name not in fed
         ]
 
-    # What the description says
+    # Model description
 
     @cached_property
     def ports(self) -> tuple[Port, ...]:
-        """All but `fault`: open inputs, outputs, and parameters, which have the system's values."""
-        known = self._known.items()
+        """All ports but `fault`: open inputs, outputs, and parameters with the system's values."""
+        known = self.text.ports.items()
         outputs, parameters = (
             [name for name, port in known if port.causality == causality]
             for causality in ("output", "parameter")
         )
         try:
-            found = [self._renamed(name) for name in (*self._open, *outputs, *parameters)]
-            found.append(largest_step(self.plan.experiment.step))
+            ports = [self._renamed(name) for name in (*self._open, *outputs, *parameters)]
+            ports.append(largest_step(self.plan.experiment.step))
             taken = {FAULT.name, TIME.name}
-            for port in found:
+            for port in ports:
                 if port.name in taken:
                     raise Unsupported(f"two variables of the FMU are named {port.name}")
                 taken.add(port.name)
-            found = [*_apart(found)]
-            check_enumerations(tuple(found))
+            ports = [*_with_distinct_enumerations(ports)]
+            check_enumerations(tuple(ports))
         except Misdeclared as error:
             raise Unsupported(str(error)) from None
-        return tuple(found)
+        return tuple(ports)
 
     def _renamed(self, name: PortName) -> Port:
-        port = replace(self._known[name], name=str(name), array=None)
+        port = replace(self.text.ports[name], name=str(name), array=None)
         if port.causality == "output":
             return replace(port, start=None, feedthrough=tuple(self._direct(name)), initially=None)
         return replace(port, start=self.text.start(name), feedthrough=(), initially=())
 
     def _direct(self, output: PortName) -> list[str]:
-        """The open inputs that an output depends on without a state between."""
+        """Return the open inputs on which an output depends directly."""
         if self.text.stages.passing is None:
-            # An output is what it has become in the step.
+            # Outputs change only in steps.
             return []
-        sources = {one.target: one.source for one in self.plan.system.connections}
-        found: set[str] = set()
+        sources = {wire.target: wire.source for wire in self.plan.system.connections}
+        inputs: set[str] = set()
         seen, waiting = {output}, [output]
         while waiting:
             at = waiting.pop()
-            for port in self._known[at].feedthrough:
+            for port in self.text.ports[at].feedthrough:
                 name = PortName(at.component, port)
                 if name not in sources:
-                    found.add(port if port == TIME.name else str(name))
+                    inputs.add(port if port == TIME.name else str(name))
                 elif sources[name] not in seen:
                     seen.add(sources[name])
                     waiting.append(sources[name])
-        return [name for name in (*map(str, self._open), TIME.name) if name in found]
+        return [name for name in (*map(str, self._open), TIME.name) if name in inputs]
 
     @cached_property
     def model(self) -> Model:
-        """What its description says."""
+        """Content of the model description."""
         experiment = self.plan.experiment
-        said = DefaultExperiment(
+        default = DefaultExperiment(
             experiment.stop_time, experiment.step, experiment.start_time, not self.text.slow
         )
-        origins = [one.origin for one in dict.fromkeys(self._definitions.values())]
+        origins = [each.origin for each in dict.fromkeys(self.text.definitions.values())]
         texts = (
-            "; ".join(dict.fromkeys(filter(None, (getattr(one, field) for one in origins))))
+            "; ".join(dict.fromkeys(filter(None, (getattr(origin, field) for origin in origins))))
             for field in Origin._fields
         )
-        return Model(self.name, self._title, Origin(*texts), self.ports, said)
+        return Model(self.name, self._title, Origin(*texts), self.ports, default)
 
-    # What it is made of
+    # Files of the FMU
 
     def parts(self, fmi: str) -> Parts:
-        """What its FMU is made of, in a version of FMI."""
+        """Return the parts of its FMU for a version of FMI."""
         system, model = self.plan.system, self.model
         places = {H_MAX: "PARAMETER_AT(h_max)"}
         for name, member in self.text.members.items():
-            of_one = places_of(self._definitions[name], f"model.{member}")
+            of_one = places_of(self.text.definitions[name], f"model.{member}")
             if self.text.kind(name).has_h_max:
                 of_one[H_MAX] = f"PARAMETER_AT(model.{self._longest(member)})"
             places |= {str(PortName(name, port)): place for port, place in of_one.items()}
@@ -341,13 +333,13 @@ class SystemModel:
         groups = {
             f"{name}.": [
                 port
-                for port in self._definitions[name].ports
+                for port in self.text.definitions[name].ports
                 if port.causality != "input" or PortName(name, port.name) in self._open
             ]
             for name in system.components
         }
         rows = "\n".join(
-            f"- `{name}`: {self._definitions[name].name}, {self._definitions[name].summary}"
+            f"- `{name}`: {self.text.definitions[name].name}, {self.text.definitions[name].summary}"
             for name in system.components
         )
         steps = _FIXED.format(slow=", ".join(sorted(self.text.slow))) if self.text.slow else _SPLIT
@@ -365,7 +357,7 @@ class SystemModel:
         )
 
     def _equations(self) -> str:
-        """The file equations.c."""
+        """Return the text of equations.c."""
         title, n = closed(self._title), len(self.text.components)
         parts = [_HEAD.format(title=title, n=n).strip(), *self.text.core(), *self._glue()]
         return "\n\n".join(parts) + "\n"
@@ -374,30 +366,32 @@ class SystemModel:
 
     @cached_property
     def _state(self) -> list[Part]:
-        """The numbers of the state, which are all that the rest of a run depends on."""
-        found = [Part("it->start_time", FLOAT, [float]), Part("it->made", INT, [int])]
+        """Parts of the state, on which the rest of a run depends."""
+        parts = [Part("it->start_time", FLOAT, [float]), Part("it->made", INT, [int])]
         for name, member in self.text.members.items():
             kind, owner = self.text.kind(name), f"it->{member}"
-            said, types = kind.said, kind.types
-            found.append(Part(f"{owner}.state", types["state"], [*scalars_of(said.state)]))
-            # Of these, any number is taken, as it has no consequence.
-            found.append(Part(f"{owner}.inputs", types["inputs"], _plain(said.inputs)))
-            numbers, shown = _plain(said.outputs), [f"{owner}_shown"] * (name in self.text.slow)
-            found += [Part(one, types["outputs"], numbers) for one in (f"{owner}.outputs", *shown)]
+            behaviour, types = kind.behaviour, kind.types
+            parts.append(Part(f"{owner}.state", types["state"], [*scalars_of(behaviour.state)]))
+            # Any number is accepted here: enumerations are checked where they are used.
+            parts.append(Part(f"{owner}.inputs", types["inputs"], _plain_types(behaviour.inputs)))
+            numbers = _plain_types(behaviour.outputs)
+            parts.append(Part(f"{owner}.outputs", types["outputs"], numbers))
+            if name in self.text.slow:
+                parts.append(Part(f"{owner}_shown", types["outputs"], numbers))
             if kind.is_timed:
-                found.append(Part(f"{owner}.time", FLOAT, [float]))
-            found += [Part(f"{owner}.draws[{i}]", FLOAT, [float]) for i in range(said.draws)]
-            if said.draws:
-                found.append(Part(f"{owner}.noise", None, _NOISE_TYPES))
-        return [part for part in found if part.types]
+                parts.append(Part(f"{owner}.time", FLOAT, [float]))
+            parts += [Part(f"{owner}.draws[{i}]", FLOAT, [float]) for i in range(behaviour.draws)]
+            if behaviour.draws:
+                parts.append(Part(f"{owner}.noise", None, _NOISE_TYPES))
+        return [part for part in parts if part.types]
 
     @cached_property
     def _placed(self) -> list[tuple[Part, int]]:
-        """The parts of the state, each with its first place."""
+        """Parts of the state, each with its first place."""
         places = accumulate((len(part.types) for part in self._state), initial=0)
         return [*zip(self._state, places, strict=False)]
 
-    # What the runtime calls
+    # Functions that the runtime calls
 
     def _glue(self) -> list[str]:
         text, members = self.text, self.text.members.items()
@@ -417,7 +411,7 @@ class SystemModel:
         parameters = [row for name, member in members for row in self._parameters(name, member)]
         n_state = sum(len(part.types) for part in self._state)
         sizes = {"inputs": len(self._open), "outputs": len(outputs), "state": n_state}
-        derived = ["simulation it;", "int begun; /* whether it has parameters */"]
+        derived = ["simulation it;", "int begun; /* if set, it has parameters */"]
         counts = ", ".join(f"MODEL_{what.upper()} = {n}" for what, n in sizes.items())
         columns = {str(name): place.text for name, place in text.columns.items()}
         bodies = {
@@ -434,7 +428,7 @@ class SystemModel:
             "update": _UPDATE.splitlines(),
         }
         return [
-            "/* What the runtime calls. */",
+            "/* Functions that the runtime calls. */",
             structure("model_parameters", parameters),
             *(structure(f"model_{what}", [f"double v[{n or 1}];"]) for what, n in sizes.items()),
             structure("model_derived", derived),
@@ -445,7 +439,7 @@ class SystemModel:
                 cycle=lcm(*self.plan.decimations.values()),
             ),
             *self._names(),
-            _TOLD.strip(),
+            _ERRORS.strip(),
             *([_NOISE.strip()] if text.equations.is_noisy else []),
             function(_PUT, [line for part, at in self._placed for line in part.put(at)], ()),
             function(_TAKE, self._taken(), ()),
@@ -457,15 +451,15 @@ class SystemModel:
         ]
 
     def _values(self, causality: str) -> list[Port]:
-        """Ports in the order of their values."""
+        """Return the ports of a causality in the order of their values."""
         return reals_first([port for port in self.ports if port.causality == causality])
 
     def _longest(self, member: str) -> str:
-        """The name of the largest internal step of a component among the parameters."""
-        found = f"{member}_h_max"
-        while found in self.text.members.values():
-            found += "_"
-        return found
+        """Return the member of the parameters for a component's largest internal step."""
+        name = f"{member}_h_max"
+        while name in self.text.members.values():
+            name += "_"
+        return name
 
     def _parameters(self, name: str, member: str) -> Iterator[str]:
         kind = self.text.kind(name)
@@ -475,7 +469,7 @@ class SystemModel:
             yield f"double {self._longest(member)};"
 
     def _set(self) -> list[str]:
-        """Hand parameters over where they have changed, or all."""
+        """Return statements that pass all parameters, or the changed ones, to the simulation."""
         lines = ["it->full_steps = it->steps = INT_MAX;", *self.text.unsplit()]
         for name, member in self.text.members.items():
             kind, owner = self.text.kind(name), f"it->{member}"
@@ -489,39 +483,41 @@ class SystemModel:
             if kind.has_h_max:
                 longest = f"parameters->{self._longest(member)} * (1.0 + {euler.ROUNDING!r})"
                 lines.append(f"{owner}.longest_step = fmin({longest}, DBL_MAX);")
-            if kind.said.draws:
+            if kind.behaviour.draws:
                 lines.append(f"{owner}.is_noisy = 1;")
         return lines
 
     def _taken(self) -> list[str]:
-        """Take a state, from which some is to be derived."""
+        """Return statements that restore a state, and mark values that must be derived again."""
         lines = [line for part, at in self._placed for line in part.take(at)]
         for name, member in self.text.members.items():
             kind = self.text.kind(name)
-            if kind.said.derived and kind.derives_anew:
+            if kind.behaviour.derived and kind.derives_anew:
                 lines.append(f"it->{member}.underived = 1;")
         return lines
 
     def _feed(self) -> Iterator[str]:
-        """Hand open inputs over."""
+        """Yield statements that pass open inputs to the simulation."""
         columns = {str(name): place for name, place in self.text.columns.items()}
         for i, port in enumerate(self._values("input")):
             place = columns[port.name]
             cast = "" if place.type == FLOAT else "(int)"
             yield f"{place.text} = {cast}inputs->v[{i}];"
         for name in dict.fromkeys(name.component for name in self._open):
-            said = self.text.kind(name).said
-            if said.derived and said.takes("derive", "inputs"):
+            if self.text.kind(name).derives_from_inputs:
                 yield f"it->{self.text.members[name]}.underived = 1;"
 
     def _renewed(self) -> Iterator[str]:
-        """Outputs that nothing computes again as values pass, and that follow parameters."""
+        """Yield statements that compute outputs again that depend on parameters.
+
+        These are outputs that are not computed when values are passed on, or that are read before.
+        """
         stages = self.plan.arrangement.stages
         place = {name: i for i, names in enumerate(stages) for name in names}
         early = {
-            one.source.component
-            for one in self.plan.system.connections
-            if place[one.source.component] >= place[one.target.component]
+            wire.source.component
+            for wire in self.plan.system.connections
+            if place[wire.source.component] >= place[wire.target.component]
         }
         passed = {
             visit.component
@@ -531,7 +527,7 @@ class SystemModel:
         }
         for i, (name, member) in enumerate(self.text.members.items()):
             kind = self.text.kind(name)
-            follows = kind.said.takes("outputs", "parameters") and not kind.said.is_sampled
+            follows = kind.follows_parameters and not kind.behaviour.is_sampled
             if follows and (name not in passed or name in early):
                 yield f"{kind.name}_evaluate(&it->{member}, error);"
                 yield "if (error->raised) {"
@@ -540,9 +536,9 @@ class SystemModel:
                 yield "}"
 
     def _check(self, name: str, member: str) -> Iterator[str]:
-        """Check the parameters of a component."""
+        """Yield statements that check the parameters of a component."""
         kind = self.text.kind(name)
-        if kind.said.hooks["check"]:
+        if kind.behaviour.hooks["check"]:
             call = kind.call("check", parameters=f"parameters->{member}")
             yield "if (!error->raised) {"
             yield f"    {call};"
@@ -550,9 +546,9 @@ class SystemModel:
             yield "}"
 
     def _check_state(self, name: str, member: str) -> Iterator[str]:
-        """Check the state of a component."""
+        """Yield statements that check the state of a component."""
         kind = self.text.kind(name)
-        if not kind.said.hooks["check_state"]:
+        if not kind.behaviour.hooks["check_state"]:
             return
         given = {"parameters": f"parameters->{member}", "state": "of_one"}
         yield "if (!error->raised) {"
@@ -566,7 +562,7 @@ class SystemModel:
         yield "}"
 
     def _names(self) -> Iterator[str]:
-        """The names of components and of their inputs."""
+        """Yield arrays with the names of components and of their inputs."""
         components = self.text.components
         yield array("string model_components", map(quoted, components))
         for i, name in enumerate(components):
@@ -576,13 +572,13 @@ class SystemModel:
         yield array("string *const model_inputs_of", inputs)
 
 
-def _plain(hint: Any) -> list[Any]:
-    """The types of numbers without what their values are called."""
+def _plain_types(hint: Any) -> list[Any]:
+    """Return the types of numbers, int for enumerations."""
     return [int if is_class(scalar, IntEnum) else scalar for scalar in scalars_of(hint)]
 
 
-def _apart(ports: Sequence[Port]) -> Iterator[Port]:
-    """Ports whose enumerations have names that no other has."""
+def _with_distinct_enumerations(ports: Sequence[Port]) -> Iterator[Port]:
+    """Yield ports with distinct names for different enumerations."""
     taken: dict[str, Mapping[str, int]] = {}
     for port in ports:
         name = port.enumeration
@@ -601,14 +597,14 @@ def write_fmu(
     """Write the FMU of a system.
 
     Args:
-        model: of the system.
-        folder: that it is written into.
+        model: model of the system.
+        folder: target folder.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
-        platforms: with commas between them, or `all`; None: this machine.
+        platforms: platforms, separated by commas, or `all`; None: this machine.
         tell: called with a line when a library is made.
 
     Raises:
-        InputError: it cannot be made, there is no such platform, or no compiler for it.
+        InputError: the FMU cannot be made, there is no such platform, or no compiler for it.
 
     """
     path = folder / f"{file_name(model.name)}.fmu"

@@ -1,17 +1,19 @@
-"""A component in C, as a program has it: its structure, its start, its outputs and its step.
+"""A component in C, as a part of a program: its structure, start, outputs and step.
 
-What the FMUs' runtime does is written here for one component, without what only a host asks for.
+This is the work of the FMUs' runtime for one component, without the calls that only hosts need.
+Noise that parameters multiply by zero is not drawn.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 
 from auv_fmu.paper import euler
-from fmus.language.tree import Function
+from fmus.language import tree
+from fmus.language.tree import ADD, DIVIDE, MULTIPLY, NEGATIVE, OVER, SUBTRACT, Function
 from fmus.language.types import FLOAT, Scalar, Type, type_of
 from fmus.native.emit import Emitter, closed, members, number_in_c, unbroken
 from fmus.native.names import in_c
@@ -19,12 +21,11 @@ from fmus.native.pieces import function, initializer, scalars, structure
 from fmus.ports.definition import Definition
 from fmus.ports.groups import Nothing
 from fmus.ports.port import H_MAX, Port
-from orchestrator.program.noise import is_added
 
 #: Equations of the time step.
 EULER = (euler.internal_steps, euler.end_of_step)
 
-#: What is said of a step that is refused, where there is somebody to hear it.
+#: Refusals of a step, with messages for programs that keep them.
 _NOT_FINITE, _UNSOUND, _TOO_MANY = (
     f"raise_error(error, {unbroken(why)});"
     for why in (
@@ -35,29 +36,33 @@ _NOT_FINITE, _UNSOUND, _TOO_MANY = (
     )
 )
 
-#: From so many numbers on, a loop checks them.
+#: Least number of values that a loop checks.
 _MANY = 4
 
-#: A number so large that whatever it is multiplied by shows, unless that is zero.
+#: A number so large that its product with any parameter but zero shows in the outputs.
 _LARGE = 1e300
+
+#: Arguments of `measured` that a value depends on, besides parameters.
+Dependence = frozenset[str]
+
+_NOTHING: Dependence = frozenset()
 
 
 @dataclass
 class Kind:
-    """A component in C, of which a system may have several.
+    """A kind of component in C; a system may have several components of a kind.
 
     Attributes:
-        definition: of it.
+        definition: its definition.
         functions: its hooks as trees.
-        emitter: of all equations.
-        name: of its structure, and what its functions begin with.
+        emitter: emitter of all equations.
+        name: name of its structure, and prefix of its functions.
         euler: equations of the time step.
-        is_tuned: whether parameters may change after the start.
-        is_checked: whether each call says whether what it has computed is sound.
-        foreseen: outputs that others take before their inputs are known, if only these are wanted
-            then.
-        is_alone: whether no other component of the program is of this kind, so that its functions
-            may stand where they are called.
+        is_tuned: if set, parameters may change after the start.
+        is_checked: if set, each call checks the values that it has computed.
+        foreseen: outputs that are passed on before the inputs are known, if only these are.
+        is_alone: if set, the program has one component of this kind, so that its functions may be
+            inlined.
 
     """
 
@@ -72,32 +77,36 @@ class Kind:
     is_alone: bool = False
 
     def __post_init__(self) -> None:
-        said = self.said = self.definition.behaviour
+        behaviour = self.behaviour = self.definition.behaviour
         self.types = {
-            "parameters": type_of(said.parameters),
-            "inputs": type_of(said.inputs),
-            "state": type_of(said.state),
-            "outputs": type_of(said.outputs),
-            "derived": type_of(said.derived or Nothing),
+            "parameters": type_of(behaviour.parameters),
+            "inputs": type_of(behaviour.inputs),
+            "state": type_of(behaviour.state),
+            "outputs": type_of(behaviour.outputs),
+            "derived": type_of(behaviour.derived or Nothing),
         }
-        self.is_timed = said.takes("outputs", "t") or said.takes("derive", "t")
-        self.follows_inputs = said.takes("outputs", "inputs")
-        self.derives_anew = any(said.takes("derive", one) for one in ("state", "inputs", "t"))
-        self.steps = said.hooks["update"] is not None
-        self.has_h_max = said.h_max is not None
+        self.is_timed = behaviour.takes("outputs", "t") or behaviour.takes("derive", "t")
+        self.follows_inputs = behaviour.takes("outputs", "inputs")
+        self.follows_parameters = behaviour.takes("outputs", "parameters")
+        self.derives_from_inputs = bool(behaviour.derived) and behaviour.takes("derive", "inputs")
+        derived_from = ("state", "inputs", "t")
+        self.derives_anew = any(behaviour.takes("derive", name) for name in derived_from)
+        self.steps = behaviour.hooks["update"] is not None
+        self.is_guarded = behaviour.hooks["credible"] is not None
+        self.has_h_max = behaviour.h_max is not None
 
     @cached_property
     def ports(self) -> Mapping[str, Sequence[Port]]:
-        """Its ports by causality, in the order of the numbers of their group."""
-        found: dict[str, list[Port]] = {"input": [], "output": [], "parameter": []}
+        """Its ports by causality, in the order of the numbers in their group."""
+        ports: dict[str, list[Port]] = {"input": [], "output": [], "parameter": []}
         for port in self.definition.ports:
             if port.name != H_MAX or not self.has_h_max:
-                found[port.causality].append(port)
-        return found
+                ports[port.causality].append(port)
+        return ports
 
     def text(self) -> Iterator[str]:
-        """Its functions."""
-        if self.said.draws:
+        """Yield its functions."""
+        if self.behaviour.draws:
             yield self._draw()
         yield self._evaluate()
         if self.foreseen:
@@ -108,15 +117,15 @@ class Kind:
             yield self._adopt()
 
     def are_finite(self, outputs: str) -> str:
-        """Whether all outputs are finite; empty: they have no floats."""
+        """Return a test that all outputs are finite; empty: there are no floats."""
         return _of_all(self.types["outputs"], outputs, "are_finite", "0.0 * {}", "== 0.0")
 
     def is_sound(self, state: str) -> str:
-        """Whether a run can go on from a state; empty: it has no numbers."""
+        """Return a test that a run can continue from a state; empty: there are no numbers."""
         limit = f"<= {number_in_c(euler.LARGEST_STATE**2)}"
         size = _of_all(self.types["state"], state, "sum_of_squares", "{0} * {0}", limit)
         among = [
-            f"({' || '.join(f'{place.text} == {int(one)}' for one in place.type.made)})"
+            f"({' || '.join(f'{place.text} == {int(value)}' for value in place.type.made)})"
             for place in scalars(self.types["state"], state)
             if place.type.made is not None
         ]
@@ -126,7 +135,7 @@ class Kind:
         return self.emitter.type(self.types[group])
 
     def call(self, hook: str, **given: str) -> str:
-        """The call of a hook, with other arguments than the component's own if they are given."""
+        """Return a call of a hook with the component's own arguments, except the given ones."""
         called = self.functions[hook]
         known = {
             "parameters": "it->parameters", "inputs": "it->inputs", "state": "it->state",
@@ -135,72 +144,72 @@ class Kind:
         return self.emitter.call(called, [known[name] for name in called.arguments])
 
     def _function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
-        how = "WITHIN" if self.is_alone and name != "start" else "APART"
-        head = f"{how} void {self.name}_{name}({self.name} *it{arguments}, Error *error)"
+        macro = "WITHIN" if self.is_alone and name != "start" else "APART"
+        head = f"{macro} void {self.name}_{name}({self.name} *it{arguments}, Error *error)"
         names = re.findall(r"(\w+)(?=,|$)", arguments)
         return function(head, lines, ["error", *filter(None, names)])
 
     def structure(self) -> str:
-        """Its structure."""
+        """Return its structure."""
         rows = [f"{self._type(what)} {what};" for what in ("parameters", "inputs", "state")]
         rows.append(f"{self._type('outputs')} outputs;")
-        if self.said.derived:
+        if self.behaviour.derived:
             rows.append(f"{self._type('derived')} derived;")
-            rows.append("int underived; /* whether it must be derived again before use */")
+            rows.append("int underived; /* if set, it must be derived again before use */")
         if self.steps:
-            rows.append("double longest_step; /* that is not split [s] */")
+            rows.append("double longest_step; /* longer ones are split [s] */")
         if self.is_timed:
             rows.append("double time; /* of the state [s] */")
-        if self.tells:
-            rows += ["double restarted; /* when its state first was [s] */", "int has_restarted;"]
-        if self.said.draws:
-            rows.append(f"double draws[{self.said.draws}];")
-            rows.append("int is_noisy; /* whether each draw makes a difference */")
-            rows.append("int has_noise; /* whether it has begun */")
-            rows.append("int undrawn; /* how often numbers are still to be drawn */")
+        if self.keeps_restart:
+            rows.append("double restarted; /* time at which a guard first reset the state [s] */")
+            rows.append("int has_restarted;")
+        if self.behaviour.draws:
+            rows.append(f"double draws[{self.behaviour.draws}];")
+            rows.append("int is_noisy; /* if set, draws make a difference */")
+            rows.append("int has_noise; /* if set, the noise has begun */")
+            rows.append("int undrawn; /* number of draws that are still to be made */")
             rows.append("generator noise;")
         return f"/* {closed(self.definition.summary)} */\n{structure(self.name, rows)}"
 
     def _derive(self, state: str, time: str) -> list[str]:
-        if not self.said.derived:
+        if not self.behaviour.derived:
             return []
         derived = f"it->derived = {self.call('derive', state=state, t=time)};"
         return ["if (it->underived) {", f"    {derived}", "    it->underived = error->raised;", "}"]
 
     @property
-    def tells(self) -> bool:
-        """Whether it keeps when its state was first started over."""
-        return self.is_tuned and self.said.hooks["credible"] is not None
+    def keeps_restart(self) -> bool:
+        """True if it keeps the time at which a guard first reset its state."""
+        return self.is_tuned and self.is_guarded
 
-    def _guarded(self, *, tells: bool = False) -> list[str]:
-        """A copy of the state, which a guard may start over."""
+    def _guarded(self, *, keeps_restart: bool = False) -> list[str]:
+        """Return statements that copy the state, and reset it if a guard says so."""
         lines = [f"{self._type('state')} state = it->state;"]
-        if self.said.hooks["credible"]:
+        if self.is_guarded:
             lines.append(f"if (!{self.call('credible', state='state')}) {{")
             lines.append(f"    state = {self.call('restarted', state='state')};")
-            if tells:
+            if keeps_restart:
                 lines.append("    if (!it->has_restarted) it->restarted = t;")
                 lines.append("    it->has_restarted = 1;")
             lines.append("}")
         return lines
 
     def _computed(self) -> list[str]:
-        """What computes the outputs."""
-        is_guarded = self.said.hooks["credible"] is not None
-        lines, state = self._guarded() * is_guarded, "state" if is_guarded else "it->state"
-        if self.said.takes("outputs", "derived"):
+        """Return statements that compute the outputs."""
+        lines, state = (self._guarded(), "state") if self.is_guarded else ([], "it->state")
+        if self.behaviour.takes("outputs", "derived"):
             lines += self._derive(state, "it->time")
         lines.append(f"{self._type('outputs')} outputs = {self.call('outputs', state=state)};")
-        if self.said.draws:
-            group = f"outputs.{in_c(self.said.noisy)}"
+        if self.behaviour.draws:
+            group = f"outputs.{in_c(self.behaviour.noisy)}"
             type_ = self.functions["measured"].returns
             lines.append(f"const {self.emitter.type(type_)} exact = {group};")
             measured = f"{group} = {self._measured('it->draws', 'exact')};"
             lines.append(measured)
-            floats = [one.text for one in scalars(type_, group) if one.type == FLOAT]
+            floats = [place.text for place in scalars(type_, group) if place.type == FLOAT]
             if self._may_skip and floats:
                 # Noise of zero may still change the sign of a zero.
-                zeros = " || ".join(f"{one} == 0.0" for one in floats)
+                zeros = " || ".join(f"{text} == 0.0" for text in floats)
                 lines += [
                     f"if (it->undrawn > 0 && ({zeros})) {{",
                     f"    {self.name}_draw(it);",
@@ -226,21 +235,21 @@ class Kind:
 
     def _measured(self, draws: str, group: str) -> str:
         type_ = self.functions["measured"].arguments["n"]
-        n = initializer(type_, (f"{draws}[{i}]" for i in range(self.said.draws)))
+        n = initializer(type_, (f"{draws}[{i}]" for i in range(self.behaviour.draws)))
         n = n if isinstance(type_, Scalar) else f"({self.emitter.type(type_)}){n}"
-        return self.call("measured", **{"n": n, self.said.noisy: group})
+        return self.call("measured", **{"n": n, self.behaviour.noisy: group})
 
     def _start(self) -> str:
-        said, lines = self.said, list[str]()
-        if said.hooks["check"]:
+        behaviour, lines = self.behaviour, list[str]()
+        if behaviour.hooks["check"]:
             lines.append(f"{self.call('check')};")
         if self.is_timed:
             lines.append("it->time = t;")
-        if said.derived:
+        if behaviour.derived:
             lines.append("it->underived = 1;")
-        if said.draws:
+        if behaviour.draws:
             lines += ["if (!it->has_noise) {", *(f"    {line}" for line in self._seed()), "}"]
-        if said.hooks["start"]:
+        if behaviour.hooks["start"]:
             lines.append(f"it->state = {self.call('start', t='t')};")
             if sound := self.is_sound("it->state"):
                 lines.append(f"if (!({sound})) {_UNSOUND}")
@@ -251,15 +260,15 @@ class Kind:
 
     @cached_property
     def _may_skip(self) -> bool:
-        """Whether noise that is multiplied by zero need not be drawn."""
-        # Parameters that change may let it count, and so may what is measured.
-        return not self.is_tuned and is_added(self.functions["measured"], "n", self.said.noisy)
+        """True if noise that is multiplied by zero need not be drawn."""
+        # Changed parameters may make it count, as may a product with the measured values.
+        return not self.is_tuned and is_added(self.functions["measured"], "n", self.behaviour.noisy)
 
     def _seed(self) -> list[str]:
-        """What begins the noise, and finds whether it counts."""
-        n, type_ = self.said.draws, self.functions["measured"].returns
+        """Return statements that begin the noise, and find out whether it makes a difference."""
+        n, type_ = self.behaviour.draws, self.functions["measured"].returns
         name = self.emitter.type(type_)
-        # They differ, or their difference would not show.
+        # All differ: a difference of equal numbers would be zero.
         large = ", ".join(f"{_LARGE / (1.0 + 0.37 * i)!r}" for i in range(n))
         noisy = [
             "Error other = {0}, *error = &other;",
@@ -282,7 +291,7 @@ class Kind:
         ]
 
     def _draw(self) -> str:
-        """What draws all that is still to be drawn."""
+        """Return the function that makes the draws that are still to be made."""
         return function(
             f"static inline void {self.name}_draw({self.name} *it)",
             [
@@ -290,21 +299,21 @@ class Kind:
                 f"    seed_generator(&it->noise, (uint32_t){self.call('seed')});",
                 "}",
                 "for (; it->undrawn > 0; it->undrawn--) {",
-                f"    draw_normals(&it->noise, it->draws, {self.said.draws});",
+                f"    draw_normals(&it->noise, it->draws, {self.behaviour.draws});",
                 "}",
             ],
             (),
         )
 
     def _advance(self) -> str:
-        said, lines = self.said, list[str]()
+        behaviour, lines = self.behaviour, list[str]()
         if self.is_timed:
-            anew = " it->underived = 1;" * said.takes("derive", "t")
+            anew = " it->underived = 1;" * behaviour.takes("derive", "t")
             lines += ["if (it->time != t) {", f"    it->time = t;{anew}", "}"]
         if self.steps:
             split = self.emitter.call(self.euler["internal_steps"], ["h", "it->longest_step"])
             lines += [
-                *self._guarded(tells=self.tells),
+                *self._guarded(keeps_restart=self.keeps_restart),
                 "int n = 1;",
                 "if (h > it->longest_step) {",
                 f"    if (h / it->longest_step > {float(euler.MOST_INTERNAL_STEPS)!r}) {{",
@@ -317,10 +326,10 @@ class Kind:
                 "for (int i = 0; i < n && !error->raised; i++) {",
             ]
             time = "t + i * step"
-            if said.takes("update", "derived"):
+            if behaviour.takes("update", "derived"):
                 lines += [f"    {line}" for line in self._derive("state", time)]
             lines.append(f"    state = {self.call('update', state='state', t=time, h='step')};")
-            if said.takes("derive", "state") or said.takes("derive", "t"):
+            if behaviour.takes("derive", "state") or behaviour.takes("derive", "t"):
                 lines.append("    it->underived = 1;")
             lines.append("}")
             if self.is_checked:
@@ -330,23 +339,23 @@ class Kind:
             lines.append("it->state = state;")
         if self.is_timed:
             lines.append("it->time = end;")
-            if said.takes("derive", "t") and not self.steps:
+            if behaviour.takes("derive", "t") and not self.steps:
                 lines.append("it->underived = 1;")
-        if said.draws:
+        if behaviour.draws:
             lines += ["it->undrawn++;", f"if (it->is_noisy) {self.name}_draw(it);"]
-        if not said.is_sampled and not self.follows_inputs:
+        if not behaviour.is_sampled and not self.follows_inputs:
             lines.append(f"{self.name}_evaluate(it, error);")
         return self._function("advance", ", double t, double h, double end", lines)
 
     def _adopt(self) -> str:
-        """What follows from parameters that have changed."""
-        lines = [f"{self.call('check')};"] if self.said.hooks["check"] else []
-        lines += ["it->underived = 1;"] * bool(self.said.derived)
+        """Return the function that adopts changed parameters."""
+        lines = [f"{self.call('check')};"] if self.behaviour.hooks["check"] else []
+        lines += ["it->underived = 1;"] * bool(self.behaviour.derived)
         return self._function("adopt", "", lines or ["(void)it;"])
 
 
 def _has_gaps(type_: Type) -> bool:
-    """Whether records without fields lie in a value, which C gives room."""
+    """Tell whether a value contains records without fields, which take memory in C."""
     if isinstance(type_, Scalar):
         return False
     parts = [part for _, part in members(type_)]
@@ -354,7 +363,7 @@ def _has_gaps(type_: Type) -> bool:
 
 
 def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
-    """A test of all floats in a value; empty: there is none."""
+    """Return a test of all floats in a value; empty: there are none."""
     places = [*scalars(type_, text)]
     floats = [place.text for place in places if place.type == FLOAT]
     if not floats:
@@ -362,4 +371,100 @@ def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
     if _MANY <= len(floats) == len(places) and not _has_gaps(type_):
         called = f"{name}((const double *)&{text}, {len(floats)})"
         return called if name == "are_finite" else f"{called} {test}"
-    return f"{' + '.join(term.format(one) for one in floats)} {test}"
+    return f"{' + '.join(term.format(text) for text in floats)} {test}"
+
+
+class _Mixed(Exception):
+    """Drawn numbers act otherwise than as terms of a sum."""
+
+
+def is_added(measured: tree.Function, drawn: str, group: str) -> bool:
+    """Tell whether drawn numbers are added to a group as terms that do not depend on it.
+
+    They are if they only pass through sums and products with parameters, and choose nothing. Then
+    the noise is the same whatever is measured.
+
+    Args:
+        measured: hook that adds the noise.
+        drawn: its argument with the drawn numbers.
+        group: its argument with the exact values.
+
+    """
+    arguments = {name: Dependence({name} & {drawn, group}) for name in measured.arguments}
+    try:
+        _Reading(drawn, arguments).result(measured)
+    except _Mixed:
+        return False
+    return True
+
+
+@dataclass
+class _Reading:
+    """Dependences of the variables of a function on drawn numbers and exact values."""
+
+    drawn: str
+    known: dict[str, Dependence]
+    returned: set[str] = field(default_factory=set)
+
+    def result(self, function: tree.Function) -> Dependence:
+        """Return the dependences of a function's result."""
+        self._read(function.body)
+        # In a loop, earlier statements may use results of later ones.
+        before: dict[str, Dependence] = {}
+        while before != self.known:
+            before = {**self.known}
+            self._read(function.body)
+        return Dependence(self.returned)
+
+    def _read(self, body: Sequence[tree.Statement]) -> None:
+        for statement in body:
+            match statement:
+                case tree.Store(values):
+                    for name, value in values:
+                        self._keep(name, self._dependence(value))
+                case tree.StoreItem(name, places, value):
+                    self._unmixed(places)
+                    self._keep(name, self._dependence(value))
+                case tree.Return(value) if value is not None:
+                    self.returned |= self._dependence(value)
+                case tree.Return() | tree.Reserve() | tree.Break() | tree.Continue():
+                    pass
+                case _:
+                    # Tests, bounds of loops, and values in error messages.
+                    self._unmixed(tree.expressions_of(statement))
+                    for block in tree.blocks_of(statement):
+                        self._read(block)
+
+    def _keep(self, name: str, made: Dependence) -> None:
+        self.known[name] = self.known.get(name, _NOTHING) | made
+
+    def _unmixed(self, expressions: Iterable[tree.Expression]) -> None:
+        """Check that expressions that choose what happens depend on parameters only."""
+        if any(map(self._dependence, expressions)):
+            raise _Mixed
+
+    def _dependence(self, expression: tree.Expression) -> Dependence:
+        match expression:
+            case tree.Local(name):
+                return self.known.get(name, _NOTHING)
+            case tree.Item(owner, place):
+                self._unmixed([place])
+                return self._dependence(owner)
+            case tree.Choice(test, value, other):
+                self._unmixed([test])
+                return self._dependence(value) | self._dependence(other)
+            case tree.Call(function, arguments):
+                known = dict(zip(function.arguments, map(self._dependence, arguments), strict=True))
+                return _Reading(self.drawn, known).result(function)
+            case tree.Operation(operator, operands):
+                return self._operated(operator, [*map(self._dependence, operands)])
+        return _NOTHING.union(*map(self._dependence, expression.parts))
+
+    def _operated(self, operator: tree.Operator, parts: Sequence[Dependence]) -> Dependence:
+        made = _NOTHING.union(*parts)
+        is_sum = operator in (ADD, SUBTRACT, NEGATIVE)
+        is_share = operator in (OVER, DIVIDE) and not parts[-1]
+        is_product = operator == MULTIPLY and (made == {self.drawn} or not all(parts))
+        if self.drawn in made and not (is_sum or is_share or is_product):
+            raise _Mixed
+        return made

@@ -1,4 +1,4 @@
-"""Programs compiled, kept in the user's cache folder, and called."""
+"""Compilation of programs, kept in the user's cache folder, and calls."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ from orchestrator.program.writer import Text
 #: Category in the cache.
 CATEGORY = "program"
 
-#: Sine and cosine of one angle, which belong together, are computed together.
+#: Flags left out, so that compilers compute sine and cosine of an angle in one call.
 _TOGETHER = ("-fno-builtin-sin", "-fno-builtin-cos")
 
-#: How programs are compiled: no number depends on it, nor on the compiler.
+#: Flags of the compiler. No number depends on them, or on the compiler.
 FLAGS = (
     "-std=c99", "-O3", "-fno-math-errno", *(flag for flag in SAME_NUMBERS if flag not in _TOGETHER),
     "-fomit-frame-pointer", "-fno-stack-protector", "-fno-plt",
@@ -44,15 +44,15 @@ FLAGS = (
 
 @dataclass(frozen=True)
 class Source:
-    """A program as text: what travels to the workers of a cluster.
+    """A program as text, which is sent to the workers of a cluster.
 
     Attributes:
-        text: of it.
+        text: text in C.
         parameters: names of its parameters, in their order.
-        columns: of its rows, without the time.
-        n_indices: how many numbers its indices are.
-        library: compiled for this machine; empty: it is not yet.
-        machine: that it is compiled for.
+        columns: names of the columns of its rows, without the time.
+        n_indices: number of values of its indices.
+        library: compiled library; empty: not compiled yet.
+        machine: machine of the library.
 
     """
 
@@ -65,12 +65,12 @@ class Source:
 
     @classmethod
     def of(cls, text: Text) -> Source:
-        """The source that a text is."""
-        n = sum(len(ports) for one in text.indices for ports in one.reducer.results.values())
+        """Make the source of a text."""
+        n = sum(len(ports) for index in text.indices for ports in index.reducer.results.values())
         return cls(text.text(), tuple(map(str, text.parameters)), tuple(map(str, text.columns)), n)
 
     def with_library(self) -> Source:
-        """The same, with what this machine has compiled."""
+        """Return the source with the library that this machine has compiled."""
         if self.library and self.machine == platform_tuple:
             return self
         [library] = read_cached(CATEGORY, self.key).values()
@@ -78,7 +78,7 @@ class Source:
 
     @property
     def key(self) -> str:
-        """Of the text, the flags and the machine."""
+        """Cache key: text, flags and machine."""
         return library_key(self.text, *FLAGS, machine=self.machine)
 
 
@@ -86,21 +86,21 @@ class Program:
     """A compiled program; several threads may make runs at the same time.
 
     Attributes:
-        source: of it.
+        source: its source.
 
     """
 
     def __init__(self, source: Source) -> None:
-        """Compile it, unless it is in the cache.
+        """Compile a program, unless it is in the cache.
 
         Raises:
-            InputError: it cannot be compiled; the text says what to do.
+            InputError: it cannot be compiled; the message says what to install.
 
         """
         self.source = source
         self._library = _loaded(source)
         self._size = self._library.size_of_simulation()
-        self._own = _Own()
+        self._memory = _ThreadMemory()
 
     def run(
         self,
@@ -111,15 +111,15 @@ class Program:
         """Make a run.
 
         Args:
-            values: of its parameters, which is not changed.
-            experiment: whose steps and times it has.
-            rows: to be filled, the time and all columns in each; None: they are not wanted.
+            values: values of its parameters, which are not changed.
+            experiment: steps and times of the run.
+            rows: array for rows, each with the time and all columns; None: no rows.
 
         Returns:
-            Its indices, where what is not there is not a number; None: a component has refused.
+            Its indices, NaN for missing ones; None: a component has refused a value.
 
         """
-        memory, library = self._own.memory(self._size), self._library
+        memory, library = self._memory.of_size(self._size), self._library
         steps = experiment.rows - 1
         if library.begin(
             memory, values.ctypes.data, experiment.start_time, experiment.step,
@@ -128,19 +128,19 @@ class Program:
             return None
         if library.run(memory, steps, None if rows is None else rows.ctypes.data):
             return None
-        found = np.empty(self.source.n_indices)
-        if len(found) and library.indices(memory, found.ctypes.data):
+        indices = np.empty(self.source.n_indices)
+        if len(indices) and library.indices(memory, indices.ctypes.data):
             return None
-        return found
+        return indices
 
 
-class _Own(local):
-    """The memory of each thread."""
+class _ThreadMemory(local):
+    """Memory of a simulation, one per thread."""
 
     def __init__(self) -> None:
         self._memory = create_string_buffer(1)
 
-    def memory(self, size: int) -> c_void_p:
+    def of_size(self, size: int) -> c_void_p:
         if len(self._memory) < size:
             self._memory = create_string_buffer(size)
         return self._memory  # type: ignore[return-value]
@@ -150,7 +150,7 @@ def _loaded(source: Source) -> CDLL:
     """Load the library of a program.
 
     Raises:
-        InputError: it cannot be compiled.
+        InputError: the program cannot be compiled.
 
     """
     try:
@@ -168,11 +168,11 @@ def _loaded(source: Source) -> CDLL:
 
 
 def _compiled(source: Source) -> bytes:
-    """The library of a program: the one that came with it, or else compiled now.
+    """Return the library that came with a program, or compile it.
 
     Raises:
         InputError: there is no compiler.
-        OSError: it fails.
+        OSError: the compiler fails.
 
     """
     if source.library and source.machine == platform_tuple:

@@ -1,10 +1,13 @@
-"""A system as one C program: its components, what goes from one to the other, and the steps.
+"""A system as one C program: its components, connections, steps, indices and events.
 
-The equations of all components are translated together, so what several of them use stands there
-once. What is written here says what the FMUs' runtime and the master do, in the same order and with
-the same numbers: `simulation` holds all values; `begin` sets parameters and lets values come to
-rest at the start; `run` makes steps, and a row after each if it is given room. Nothing is
-allocated, printed or shared.
+The equations of all components are translated together, so that functions they share occur once.
+The program does the work of the FMUs' runtime and of the master, in the same order and with the
+same numbers. `simulation` holds all values. `begin` sets parameters and settles values at the
+start. `run` makes steps, and writes a row after each if it has memory for rows. The program
+allocates, prints and shares nothing.
+
+For a program with events, `events.c` does between two steps what
+:mod:`orchestrator.cosim.hooks.events` does. It has only numbers; the page writes the texts.
 """
 
 from __future__ import annotations
@@ -12,9 +15,12 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from itertools import chain
+from pathlib import Path
+from textwrap import wrap
+from typing import Any, NamedTuple
 
 from auv_fmu.paper import euler
 from fmus.language import tree
@@ -34,20 +40,21 @@ from orchestrator.cosim import (
     Plan,
     PortName,
     Stage,
+    System,
     Visit,
 )
 from orchestrator.machine.errors import InputError, listed
-from orchestrator.program.events import BEGINNING, tables_of, text_of_events
 from orchestrator.program.kind import EULER, Kind
-from orchestrator.program.reducing import Looking
+from orchestrator.vehicle.reduction import sources_of
+from orchestrator.vehicle.signals import Loop
 
-#: What a component has refused, where `failure` names one.
+#: Calls that a component may refuse, as `failure` reports them.
 CALLS = START, INPUT, OUTPUTS, STEP, SET = "AT_START", "AT_INPUT", "AT_OUTPUTS", "AT_STEP", "AT_SET"
 
-#: How many numbers functions are given as they are; of more they get the address.
+#: Most numbers of an argument that is passed by value; larger ones are passed by address.
 _MOST_COPIED = 16
 
-#: Values go along all connections so often at the start, until they rest.
+#: Most rounds in which values are passed along all connections at the start.
 _MOST_ROUNDS = 1000
 
 _INCLUDES = """\
@@ -55,13 +62,14 @@ _INCLUDES = """\
 #include <stddef.h>
 #include <stdint.h>"""
 
-#: What stands before functions that others call.
+#: Macro before functions that hosts call.
 EXPORTED = """\
 #ifndef EXPORTED
 #define EXPORTED
 #endif"""
 
-#: How functions are called: those of components lie apart, and equations within them.
+#: Macros of functions: with `True`, equations are inlined into the functions of components, which
+#: are not inlined themselves.
 _HEADS = {
     False: "#ifndef APART\n#define APART static\n#endif",
     True: (
@@ -73,8 +81,8 @@ _HEADS = {
 }
 
 _FAILURE = """\
-/* Where Python raises an exception, equations continue with the results of C, and the error is
- * noted, without its message. */
+/* Where Python raises an exception, equations continue with the results of C. Only the fact is
+ * recorded, not the message. */
 typedef struct {
     int raised;
 } Error;
@@ -89,7 +97,7 @@ int(raise_error)(Error *error, const char *what, ...);
 """
 
 _CHECKS = """\
-/* Partial sums that processors add side by side. */
+/* Partial sums, for vector instructions. */
 enum { LANES = 4 };
 
 static inline double sum_of(const double values[], int n) {
@@ -102,7 +110,7 @@ static inline double sum_of(const double values[], int n) {
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-/* Whether all values are finite: their sum is, or is not only because they are large. */
+/* True if all values are finite. Usually their sum shows it; large ones may overflow. */
 static inline int are_finite(const double values[], int n) {
     int i = 0;
     if (isfinite(sum_of(values, n))) return 1;
@@ -120,8 +128,8 @@ static inline double sum_of_squares(const double values[], int n) {
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-/* Takes a value into an input: 0 where it is the same bit for bit, 1 where it is another one, and
- * 3 where that is more than a rounding error. */
+/* Assigns a value to an input. Returns 0 if its bits are the same, 1 if it differs by a rounding
+ * error, else 3. */
 static inline int take(double *input, double value) {
     const double before = *input;
     if (memcmp(&before, &value, sizeof value) == 0) return 0;
@@ -145,14 +153,14 @@ static inline double time_after(const simulation *it, int k) {
     return k <= it->full_steps ? it->start_time + (double)k * it->step : it->stop_time;
 }
 
-/* How long n steps after the k-th last, or as many of them as are left. */
+/* Length of n steps from the k-th, or of the rest of the run if that is shorter [s]. */
 static inline double length_of(const simulation *it, int k, int n) {
     if (k + n <= it->full_steps) return (double)n * it->step;
     if (it->steps > it->full_steps) return it->stop_time - time_after(it, k);
     return (double)(it->full_steps - k) * it->step;
 }
 
-/* Notes what was refused. */
+/* Records a refusal. Returns 1. */
 static int refused(simulation *it, int component, int call, int port) {
     it->component = component;
     it->call = call;
@@ -160,23 +168,18 @@ static int refused(simulation *it, int component, int call, int port) {
     return 1;
 }"""
 
-#: What keeps a file from being included twice.
+#: Include guard of a header.
 _GUARD = re.compile(r"^#ifndef (\w+_[CH])\n#define \1\n|\n#endif\n\Z", re.MULTILINE)
 
 _BEGIN = """\
-/* Sets parameters, and lets values come to rest at the start; whether a component refuses. */
 EXPORTED int begin(simulation *it, const double parameters[], double start_time, double step,
                    double stop_time, int full_steps, int steps)"""
 
-_RUN = """\
-/* Makes steps until so many are made, and rows if there is room for them; whether a component
- * refuses. */
-EXPORTED int run(simulation *it, int until, double rows[])"""
 
 _ACCESS = """\
 EXPORTED size_t size_of_simulation(void) { return sizeof(simulation); }
 
-/* What was refused: the component, by its number; a call; and which input; after how many steps. */
+/* Gives the refusal: numbers of component, call and input, and of steps before it. */
 EXPORTED void failure(const simulation *it, int found[]) {
     found[0] = it->component;
     found[1] = it->call;
@@ -184,22 +187,102 @@ EXPORTED void failure(const simulation *it, int found[]) {
     found[3] = it->made;
 }
 
-/* How many rows there are. */
+/* Returns the number of rows. */
 EXPORTED int rows_shown(const simulation *it) { return it->shown; }"""
 
 
+_EVENTS = Path(__file__).with_name("events.c")
+
+_EVENT_TABLES = """\
+/* A number of the simulation. */
+typedef struct {{
+    size_t place;
+    int is_whole;
+}} number;
+
+/* An input: its column, and the factor and offset of its connection. */
+typedef struct {{
+    int column, is_fed;
+    double factor, offset;
+}} input;
+
+/* Something that can be set: a parameter, or an unconnected input. */
+typedef struct {{
+    number at;
+    int component;
+    int input; /* its number; -1: a parameter */
+}} settable;
+
+static const number columns[] = {{
+{columns}
+}};
+
+static const input inputs[] = {{
+{inputs}
+}};
+
+static const settable settables[] = {{
+{settables}
+}};
+
+enum {{
+    COMPONENTS = {n_components}, INPUTS = {n_inputs}, SETTABLES = {n_settables}
+}};
+
+static double get(const simulation *it, number of) {{
+    const char *place = (const char *)it + of.place;
+    double value;
+    int whole;
+    if (!of.is_whole) {{
+        memcpy(&value, place, sizeof value);
+        return value;
+    }}
+    memcpy(&whole, place, sizeof whole);
+    return whole;
+}}
+
+static void put(simulation *it, number of, double value) {{
+    char *place = (char *)it + of.place;
+    const int whole = of.is_whole ? (int)value : 0;
+    if (of.is_whole) {{
+        memcpy(place, &whole, sizeof whole);
+    }} else {{
+        memcpy(place, &value, sizeof value);
+    }}
+}}"""
+
+#: Initialisation of parameters, and of values that events alter.
+_BEGINNING = (
+    "for (int i = 0; i < SETTABLES; i++) put(it, settables[i].at, parameters[i]);",
+    "for (int i = 0; i < SETTABLES; i++) {",
+    "    if (settables[i].input >= 0) it->supplied[settables[i].input] = parameters[i];",
+    "}",
+    "for (int i = 0; i < INPUTS; i++) {",
+    "    it->factors[i] = inputs[i].factor;",
+    "    it->offsets[i] = inputs[i].offset;",
+    "}",
+    "for (int i = 0; i < COMPONENTS; i++) it->started[i] = start_time;",
+)
+
+#: Definitions for systems in which values pass along connections before a row, or not.
+_PASSING = {
+    True: "enum { HAS_PASSING = 1 };\n\n#define PASS(it, k, t) pass(it, k, t, &(Error){0})",
+    False: "enum { HAS_PASSING = 0 };\n\n#define PASS(it, k, t) 0",
+}
+
+
 class Unsupported(InputError):
-    """A system that cannot be one program; the text says why."""
+    """A system that cannot be one program, with the reason."""
 
 
 class Equations:
-    """The equations of components, and of indices: what programs of several systems can share.
+    """Equations of components and of indices, which programs of several systems can share.
 
     Attributes:
-        emitter: of all of them.
-        kinds: of components, by their definitions.
-        reducers: that make indices, by their identities.
-        is_quick: whether what is computed is checked by the program.
+        emitter: emitter of all equations.
+        kinds: components in C, by definition.
+        reducers: indices in C, by `id` of the reducer.
+        is_quick: if set, the program checks outputs and states instead of each component.
 
     """
 
@@ -212,81 +295,82 @@ class Equations:
         foreseen: Callable[[Definition], Sequence[str]] = lambda _: (),
         feeding: Callable[[Definition], Iterable[Definition]] = lambda _: (),
     ) -> None:
-        """Translate all of them together.
+        """Translate all equations together.
 
         Args:
-            definitions: of the components.
-            reducers: that make indices.
-            is_tuned: whether parameters may change after the start.
-            is_quick: whether what is computed is checked by the program, if it can wait for that.
-            foreseen: outputs that others take before their inputs are known.
-            feeding: definitions of what feeds components.
+            definitions: definitions of the components.
+            reducers: reducers of the indices.
+            is_tuned: if set, parameters may change after the start.
+            is_quick: if set, the program checks outputs and states, where that can wait.
+            foreseen: outputs that other components take before the inputs are known.
+            feeding: definitions of the components that feed those of a definition.
 
         Raises:
-            Unsupported: one is outside the language of equations.
+            Unsupported: a component is outside the language of equations.
 
         """
-        definitions, reducers = [*definitions], [*reducers]
-        counts = Counter[Any]([*definitions, *map(id, reducers)])
-        distinct = [*dict.fromkeys(definitions)]
-        hooks = {one: one.behaviour.hooks for one in distinct}
+        counts, reducer_counts = Counter(definitions), Counter(map(id, reducers := [*reducers]))
+        by_id = {id(reducer): reducer for reducer in reducers}
         euler: Any = EULER
-        by_identity = {id(one): one for one in reducers}
+        hooks = {
+            definition: {name: hook for name, hook in definition.behaviour.hooks.items() if hook}
+            for definition in counts
+        }
+        index_hooks = [hook for reducer in by_id.values() for hook in reducer.hooks.values()]
         program = Program(
-            *(hook for one in distinct for hook in hooks[one].values() if hook),
+            *chain.from_iterable(of_one.values() for of_one in hooks.values()),
             *euler,
-            *(hook for one in by_identity.values() for hook in one.hooks.values()),
+            *index_hooks,
         )
         try:
             program.check()
         except Untranslatable as error:
             raise Unsupported(str(error).splitlines()[0]) from None
         trees = {
-            one: {name: program.function(hook) for name, hook in hooks[one].items() if hook}
-            for one in distinct
+            definition: {name: program.function(hook) for name, hook in of_one.items()}
+            for definition, of_one in hooks.items()
         }
-        looks = (hook for one in by_identity.values() for hook in one.hooks.values())
         self._is_inlined = is_quick
-        # What waits for a number would wait for ever for one that is none.
+        # A loop that waits for a number to change may never end if it is NaN.
         waits = _waiting(program.functions.values())
-        self.is_quick = is_quick and waits.isdisjoint(map(program.function, looks))
-        waiting = {one for one in distinct if not waits.isdisjoint(trees[one].values())}
-        checked = waiting.union(*map(feeding, waiting)) if self.is_quick else {*distinct}
+        self.is_quick = is_quick and waits.isdisjoint(map(program.function, index_hooks))
+        waiting = {one for one in trees if not waits.isdisjoint(trees[one].values())}
+        checked = waiting.union(*map(feeding, waiting)) if self.is_quick else {*trees}
         self.emitter = Emitter(program.functions.values(), _MOST_COPIED)
-        self._euler = {one.__name__: program.function(one) for one in euler}
+        self._euler = {equation.__name__: program.function(equation) for equation in euler}
         self.kinds = {
-            one: Kind(
-                one,
-                trees[one],
+            definition: Kind(
+                definition,
+                functions,
                 self.emitter,
-                self.emitter.unused(f"{_lower(one.name)}_component"),
+                self.emitter.unused(f"{_lower(definition.name)}_component"),
                 self._euler,
                 is_tuned,
-                one in checked,
-                () if one in checked else foreseen(one),
-                is_quick and counts[one] == 1,
+                definition in checked,
+                () if definition in checked else foreseen(definition),
+                is_quick and counts[definition] == 1,
             )
-            for one in distinct
+            for definition, functions in trees.items()
         }
         self.reducers = {
             key: ReducerText(
-                one,
+                reducer,
                 program,
                 self.emitter,
-                self.emitter.unused(f"{_lower(one.name)}_index"),
-                is_quick and counts[key] == 1,
+                self.emitter.unused(f"{_lower(reducer.name)}_index"),
+                is_quick and reducer_counts[key] == 1,
             )
-            for key, one in by_identity.items()
+            for key, reducer in by_id.items()
         }
 
     @property
     def is_noisy(self) -> bool:
-        """Whether random numbers are drawn."""
-        return any(kind.said.draws for kind in self.kinds.values())
+        """True if a component draws random numbers."""
+        return any(kind.behaviour.draws for kind in self.kinds.values())
 
     def text(self) -> list[str]:
-        """All of it."""
-        # Writing these adds to the structures.
+        """Return the parts of the text."""
+        # Writing these adds to the emitter's structures.
         structures, functions = self._structures, self._functions
         equations = self.emitter.text()
         if self._is_inlined:
@@ -301,12 +385,12 @@ class Equations:
         ]
 
     def apart(self) -> str:
-        """All of it as a source of its own."""
+        """Return the equations as a separate source."""
         return "\n\n".join([head_of(self), *self.text()]) + "\n"
 
     @cached_property
     def header(self) -> str:
-        """What a program has to know of what is compiled apart."""
+        """Declarations for programs whose equations are a separate source."""
         structures, functions = self._structures, "\n".join(self._functions)
         heads = re.findall(r"^APART ([^{]+?) \{$", functions, re.MULTILINE)
         return "\n\n".join(
@@ -316,27 +400,25 @@ class Equations:
                 Emitter(self._euler.values()).text(),
                 _CHECKS,
                 *structures,
-                *(f"{one};" for one in heads),
+                *(f"{head};" for head in heads),
             ]
         )
 
+    @property
+    def _parts(self) -> list[Kind | ReducerText]:
+        return [*self.kinds.values(), *self.reducers.values()]
+
     @cached_property
     def _structures(self) -> list[str]:
-        return [
-            *(one.structure() for one in self.kinds.values()),
-            *(one.structure() for one in self.reducers.values()),
-        ]
+        return [part.structure() for part in self._parts]
 
     @cached_property
     def _functions(self) -> list[str]:
-        return [
-            *(part for one in self.kinds.values() for part in one.text()),
-            *(part for one in self.reducers.values() for part in one.text()),
-        ]
+        return [text for part in self._parts for text in part.text()]
 
 
 def head_of(equations: Equations) -> str:
-    """What a source with equations begins with."""
+    """Return the beginning of a source with equations."""
     arithmetic = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
     noise = (RUNTIME / "noise.c").read_text(encoding="utf-8")
     arithmetic = arithmetic.replace('#include "error.h"\n', _FAILURE)
@@ -344,33 +426,64 @@ def head_of(equations: Equations) -> str:
     return "\n\n".join(_GUARD.sub("", part).strip() for part in parts)
 
 
+class Index(NamedTuple):
+    """An index of a system, and the sources of its signals.
+
+    Attributes:
+        reducer: the reducer of the index.
+        sources: a port, parameter or constant for each port of its rows, in their order.
+
+    """
+
+    reducer: Reducer
+    sources: Sequence[PortName | float]
+
+
+def indices_of(system: System, loop: Loop, reducers: Iterable[Reducer]) -> Iterator[Index]:
+    """Yield the indices of a loop for which a system has all signals and parameters."""
+    names = [
+        f"{name}.{variable.name}"
+        for name, component in system.components.items()
+        for causality in ("input", "output", "parameter")
+        for variable in component.having(causality)
+    ]
+    places = {name: i for i, name in enumerate(names)}
+    for reducer in reducers:
+        signals = sources_of(reducer, loop, places, {})
+        if not signals.missing:
+            constants = {port: float(value) for port, value in signals.constants.items()}
+            ports = {
+                port: system.named(PortName.read(names[i])) for port, i in signals.places.items()
+            }
+            sources: dict[str, PortName | float] = {**constants, **ports}
+            yield Index(reducer, [sources[port.name] for port in reducer.ports])
+
+
 @dataclass
 class Text:
     """The program of a system.
 
     Attributes:
-        plan: of the run that it makes.
-        definitions: of its components, by their names.
-        indices: that look on.
-        is_tuned: whether parameters may change after the start.
-        is_hosted: whether a host says when each step begins.
-        alters: whether events can happen in it.
-        is_quick: whether outputs and states are checked together, once a step; that
-            does not tell which component has refused.
-        shared: equations that it shares with other programs; None: it has its own.
+        plan: plan of its run.
+        definitions: definitions of its components, by component.
+        indices: indices that it computes.
+        is_tuned: if set, parameters may change after the start.
+        is_hosted: if set, a host passes the time of each step.
+        alters: if set, events can happen.
+        is_quick: if set, outputs and states are checked together, once a step, without finding out
+            which component refuses.
+        shared: equations that it shares with other programs; None: its own.
 
     """
 
     plan: Plan
     definitions: Mapping[str, Definition]
-    indices: Sequence[Looking] = ()
+    indices: Sequence[Index] = ()
     is_tuned: bool = False
     is_hosted: bool = False
     alters: bool = False
     is_quick: bool = False
     shared: Equations | None = None
-    #: Functions of connections that map values, by what follows their names.
-    mappings: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Translate the equations.
@@ -380,7 +493,8 @@ class Text:
                 component is outside the language of equations.
 
         """
-        system = self.plan.system
+        #: Functions of connections that map values: beginnings by the rest of the text.
+        self._mappings: dict[str, str] = {}
         if self.plan.rings:
             names = listed(self.plan.rings[0])
             raise Unsupported(
@@ -395,12 +509,12 @@ class Text:
         self.stages = self.plan.stages()
         self.passes = self.stages.passing is not None
         self.is_tuned = self.is_tuned or self.alters
-        self.components = [*system.components]
+        self.components = [*self.plan.system.components]
         self.members = dict(zip(self.components, _distinct(self.components), strict=True))
         self.slow = [name for name, n in self.plan.decimations.items() if n > 1]
         self.equations = self.shared or Equations(
             (self.definitions[name] for name in self.components),
-            [one.reducer for one in self.indices],
+            [index.reducer for index in self.indices],
             self.is_tuned,
             self.is_quick,
             self._foreseen,
@@ -410,15 +524,24 @@ class Text:
         self.emitter, self.kinds = self.equations.emitter, self.equations.kinds
         self.reducers = self.equations.reducers
 
-    # What there is
+    # Components, ports and their places
 
     def kind(self, component: str) -> Kind:
-        """The kind of a component."""
+        """Return the kind of a component."""
         return self.kinds[self.definitions[component]]
 
     @cached_property
+    def ports(self) -> Mapping[PortName, Port]:
+        """Ports of all components, as their authors declared them."""
+        return {
+            PortName(name, port.name): port
+            for name in self.components
+            for port in self.definitions[name].ports
+        }
+
+    @cached_property
     def columns(self) -> dict[PortName, Place]:
-        """All inputs and outputs, as a row shows them."""
+        """Places of all inputs and outputs, in the order of a row."""
         found: dict[PortName, Place] = {}
         for name in self.components:
             found |= self._inputs(name)
@@ -427,13 +550,13 @@ class Text:
 
     @cached_property
     def inputs(self) -> dict[PortName, int]:
-        """The numbers of all inputs."""
+        """Numbers of all inputs."""
         names = (port for name in self.components for port in self._inputs(name))
         return {port: i for i, port in enumerate(names)}
 
     @cached_property
     def parameters(self) -> dict[PortName, Place]:
-        """All parameters, and the inputs that nothing feeds."""
+        """Places of all parameters and unconnected inputs."""
         found: dict[PortName, Place] = {}
         for name in self.components:
             kind, owner = self.kind(name), f"it->{self.members[name]}"
@@ -446,8 +569,8 @@ class Text:
         return found
 
     def start(self, name: PortName) -> float | int | bool:
-        """What a parameter, or an input that nothing feeds, is at the start."""
-        value, port = self.plan.system.value(name), self.port(name)
+        """Return the value of a parameter or an unconnected input at the start."""
+        value, port = self.plan.system.value(name), self.ports[name]
         if isinstance(value, str):
             variable = self.plan.system.components[name.component].variable(name.port)
             value = int(variable.items[value])
@@ -472,7 +595,7 @@ class Text:
 
     @cached_property
     def _arrays(self) -> dict[str, str]:
-        """The types of all arrays of numbers among inputs and outputs, by where they lie."""
+        """Types of all arrays of numbers among inputs and outputs, by place."""
         found: dict[str, str] = {}
         for name in self.components:
             kind, owner = self.kind(name), f"it->{self.members[name]}"
@@ -483,10 +606,10 @@ class Text:
         return found
 
     def _foreseen(self, definition: Definition) -> list[str]:
-        """The outputs that others take before they pass, in a program that computes only these."""
+        """Return the outputs that are passed on before the inputs of their component are known."""
         if not self.passes:
             return []
-        sources = dict.fromkeys(one.source for one in self.plan.system.connections)
+        sources = dict.fromkeys(wire.source for wire in self.plan.system.connections)
         return [
             *dict.fromkeys(
                 source.port
@@ -497,40 +620,40 @@ class Text:
         ]
 
     def _feeding(self, definition: Definition) -> Iterable[Definition]:
-        """The definitions of what feeds components of one."""
+        """Yield the definitions of components that feed components of this definition."""
         return (
-            self.definitions[one.source.component]
-            for one in self.plan.system.connections
-            if self.definitions[one.target.component] is definition
+            self.definitions[wire.source.component]
+            for wire in self.plan.system.connections
+            if self.definitions[wire.target.component] is definition
         )
 
     # The text
 
     def text(self) -> str:
-        """All of it."""
-        # Without the name of the system: others that are alike have the same program.
+        """Return the whole program."""
+        # Without the name of the system, so that equal systems have the same program.
         title = closed(f"{listed(self.components)} as one program.")
         parts = [f"/* {title} */", head_of(self.equations), *self.core(), *self.calls()]
         return "\n\n".join(parts) + "\n"
 
     def apart(self) -> str:
-        """All but the equations, of which it has the header."""
+        """Return the program without the equations, with a header for them."""
         return "\n\n".join([self.equations.header, *self._own(), *self.calls()]) + "\n"
 
     def core(self) -> list[str]:
-        """What it is, whoever calls it: equations, components, the start, and a step."""
+        """Return the parts for all kinds of hosts: equations, components, the start, and a step."""
         return [*self.equations.text(), *self._own()]
 
     def _own(self) -> list[str]:
         # Writing these adds to the mappings.
-        simulation, rest, steps = self._simulation(), self._rest(), self._steps()
-        mappings = (head + body for body, head in self.mappings.items())
+        simulation, rest, steps = self._simulation(), self._settling(), self._steps()
+        mappings = (head + body for body, head in self._mappings.items())
         return [simulation, _TIMES, *mappings, rest, *steps]
 
     def calls(self) -> list[str]:
-        """What a host calls."""
+        """Return the functions that a host calls."""
         return [
-            *([tables_of(self)] if self.alters else []),
+            *([self._event_tables()] if self.alters else []),
             EXPORTED,
             self._begin(),
             f"enum {{ WIDTH = {1 + len(self.columns)} }};",
@@ -538,15 +661,15 @@ class Text:
             *self._look(),
             *self._run(),
             _ACCESS,
-            *([text_of_events(self)] if self.alters else []),
+            *([self._event_text()] if self.alters else []),
         ]
 
     def _simulation(self) -> str:
         rows = [
             "double start_time, step, stop_time;",
-            "int full_steps, steps; /* if there is one more of all steps, it is shorter */",
-            "int made, shown; /* steps, and rows */",
-            "int component, call, port; /* that was refused */",
+            "int full_steps, steps; /* of full length, and all: one more if the last is shorter */",
+            "int made, shown; /* numbers of steps, and of rows */",
+            "int component, call, port; /* of a refusal */",
             *(f"{self.kind(name).name} {member};" for name, member in self.members.items()),
         ]
         for name in self.slow:
@@ -555,23 +678,23 @@ class Text:
         for i, (reducer, _) in enumerate(self.indices):
             rows.append(f"{self.reducers[id(reducer)].name} index_{i};")
         if self.indices:
-            rows.append("double looked; /* when the last row was looked at [s] */")
+            rows.append("double looked; /* time of the last row that indices took [s] */")
         if self.alters:
             n = len(self.inputs)
             rows += [
                 f"double factors[{n}], offsets[{n}]; /* of inputs */",
-                f"double supplied[{n}]; /* to inputs that nothing feeds */",
-                f"double started[{len(self.components)}]; /* when components were [s] */",
-                "int due; /* after how many steps an event needs action */",
+                f"double supplied[{n}]; /* values of unconnected inputs */",
+                f"double started[{len(self.components)}]; /* start times of components [s] */",
+                "int due; /* number of steps after which an event needs action */",
             ]
         whole = structure("simulation", rows)
         calls = f"enum {{ {', '.join(CALLS)} }};"
-        return f"/* Everything that a run depends on. */\n{whole}\n\n{calls}"
+        return f"/* All values of a run. */\n{whole}\n\n{calls}"
 
     # The start
 
     def set_parameters(self) -> list[str]:
-        """Take the numbers of an array as parameters."""
+        """Return statements that set the parameters from an array."""
         values = [
             (place.text, f"parameters[{i}]" if place.type == FLOAT else f"(int)parameters[{i}]")
             for i, place in enumerate(self.parameters.values())
@@ -587,14 +710,15 @@ class Text:
             "it->stop_time = stop_time;",
             "it->full_steps = full_steps;",
             "it->steps = steps;",
-            *(BEGINNING if self.alters else self.set_parameters()),
+            *(_BEGINNING if self.alters else self.set_parameters()),
             *self.unsplit(),
             "return come_to_rest(it, &noted) != 0;",
         ]
-        return function(_BEGIN, lines, ())
+        doc = "Sets parameters and settles values at the start. Returns 1 if a component refuses."
+        return _function(doc, _BEGIN, lines, ())
 
     def unsplit(self) -> Iterator[str]:
-        """Let components split steps that are longer than they may be, or none."""
+        """Yield statements that set the longest step that each component does not split."""
         for name in self.components:
             kind, place = self.kind(name), f"it->{self.members[name]}.longest_step"
             if kind.has_h_max:
@@ -602,16 +726,16 @@ class Text:
             elif kind.steps:
                 yield f"{place} = DBL_MAX;"
 
-    def _rest(self) -> str:
-        """What lets values come to rest at the start."""
+    def _settling(self) -> str:
+        """Return the functions that settle values at the start."""
         system = self.plan.system
         order = [name for names in self.plan.arrangement.settling for name in names]
         turn = {name: i for i, name in enumerate(order)}
-        # What feeds a component before it is its own component's turn.
+        # Components that feed others before their own turn.
         early = {
-            one.source.component
-            for one in system.connections
-            if turn[one.source.component] >= turn[one.target.component]
+            wire.source.component
+            for wire in system.connections
+            if turn[wire.source.component] >= turn[wire.target.component]
         }
         settled, passed = ["int changed = 0, other;"], list[str]()
         for name in order:
@@ -625,13 +749,13 @@ class Text:
             ]
             passed += [
                 f"if (feed_{i}(it, it, error)) {{",
-                *map("    {}".format, self._anew(name)),
+                *map("    {}".format, self._evaluated_again(name)),
                 "}",
             ]
         starts = []
         for connection in system.connections:
             place = self.columns[connection.target]
-            start = self.port(connection.target).start
+            start = self.ports[connection.target].start
             number = number_in_c(_as(place, 0 if start is None else start))
             starts.append(f"{place.text} = {number};")
         lines = [
@@ -644,50 +768,46 @@ class Text:
             ),
             "changed = settle(it, 1, error);",
             f"while (changed > 0 && rounds++ < {_MOST_ROUNDS}) changed = settle(it, 0, error);",
-            # Of values that go on by rounding errors, the start leaves one.
+            # Values may keep changing by rounding errors: the start keeps one of them.
             *(["if (changed == 1) return hand_on(it, error) ? -1 : 0;"] if early else []),
             "return changed;",
         ]  # fmt: skip
-        handed_on = function(
-            "static int hand_on(simulation *it, Error *error)", [*passed, "return 0;"]
+        settle = _function(
+            "Passes values along all connections once. Returns the bitwise or of all results of "
+            "`take`, or -1 if a component refuses.",
+            "static int settle(simulation *it, int everything, Error *error)",
+            [*settled, "return changed;"],
         )
-        doc = "/* Hands values on after the start; whether a component refuses. */"
-        return "\n\n".join(
-            (
-                *(part for name in self.components for part in self._fed(name)),
-                "/* Hands values along all connections once: what `take` says of all, or -1 where\n"
-                " * a component refuses. */\n"
-                + function(
-                    "static int settle(simulation *it, int everything, Error *error)",
-                    [*settled, "return changed;"],
-                ),
-                *([f"{doc}\n{handed_on}"] if early else []),
-                "/* Lets values come to rest at the start: 0, 3 where they do not, or -1 where a\n"
-                " * component refuses. */\n"
-                + function(
-                    "static int come_to_rest(simulation *it, Error *error)",
-                    lines,
-                ),
-            )
+        hand_on = _function(
+            "Passes values on after the start. Returns 1 if a component refuses.",
+            "static int hand_on(simulation *it, Error *error)",
+            [*passed, "return 0;"],
         )
+        come_to_rest = _function(
+            "Settles values at the start. Returns 0, 3 if they do not come to rest, or -1 if a "
+            "component refuses.",
+            "static int come_to_rest(simulation *it, Error *error)",
+            lines,
+        )
+        feeding = (part for name in self.components for part in self._feeding_and_start(name))
+        return "\n\n".join([*feeding, settle, *([hand_on] if early else []), come_to_rest])
 
-    def _fed(self, name: str) -> Iterator[str]:
-        """What feeds a component, and what starts it."""
+    def _feeding_and_start(self, name: str) -> Iterator[str]:
+        """Yield the functions that feed and start a component."""
         i, taken = self.components.index(name), list[str]()
         member = f"it->{self.members[name]}"
         for connection in self.plan.system.feeding[name]:
             target = self.columns[connection.target]
             take = "take" if target.type == FLOAT else "take_whole"
             taken.append(f"is_other |= {take}(&{target.text}, {self.value(connection, 'now')});")
-        yield (
-            f"/* Lets {closed(name)} take what feeds it now; whether it is anything else. */\n"
-            + function(
-                f"static int feed_{i}(simulation *it, const simulation *now, Error *error)",
-                ["int is_other = 0;", *taken, "return is_other;"],
-                ("it", "now", "error"),
-            )
+        yield _function(
+            f"Passes the current values to {closed(name)}. Returns nonzero if any changes.",
+            f"static int feed_{i}(simulation *it, const simulation *now, Error *error)",
+            ["int is_other = 0;", *taken, "return is_other;"],
+            ("it", "now", "error"),
         )
-        yield "/* Starts it; whether it refuses. */\n" + function(
+        yield _function(
+            "Starts it. Returns 1 if it refuses.",
             f"static int start_{i}(simulation *it, double t, Error *error)",
             [
                 *self.checked_inputs(name),
@@ -699,13 +819,13 @@ class Text:
             ],
         )
 
-    def _anew(self, name: str) -> Iterator[str]:
-        """Compute the outputs of a component that has taken other inputs at the start."""
-        said, member = self.kind(name).said, f"it->{self.members[name]}"
+    def _evaluated_again(self, name: str) -> Iterator[str]:
+        """Yield statements that compute the outputs after other inputs at the start."""
+        kind, member = self.kind(name), f"it->{self.members[name]}"
         yield from self.checked_inputs(name)
-        if said.derived and said.takes("derive", "inputs"):
+        if kind.derives_from_inputs:
             yield f"{member}.underived = 1;"
-        yield f"{self.kind(name).name}_evaluate(&{member}, error);"
+        yield f"{kind.name}_evaluate(&{member}, error);"
         yield self._refusal(name, OUTPUTS)
         if name in self.slow:
             yield f"{member}_shown = {member}.outputs;"
@@ -713,24 +833,21 @@ class Text:
     def _refusal(self, name: str, call: str) -> str:
         return f"if (error->raised) return refused(it, {self.components.index(name)}, {call}, 0);"
 
-    def port(self, name: PortName) -> Port:
-        """A port of a component, as its author declared it."""
-        ports = self.definitions[name.component].ports
-        return next(port for port in ports if port.name == name.port)
-
-    # What goes along connections
+    # Values along connections
 
     def checked_inputs(self, name: str) -> Iterator[str]:
-        """Refuse inputs that are out of range."""
+        """Yield statements that refuse inputs that are out of range."""
         found, kind = self._inputs(name), self.kind(name)
         feeding = self.plan.system.feeding[name]
-        # What is multiplied may become infinite, and whole numbers too large.
+        # A product may be infinite, and a whole number too large.
         changed = {
-            one.target for one in feeding if self.alters or isinstance(one.transformation, Linear)
+            wire.target
+            for wire in feeding
+            if self.alters or isinstance(wire.transformation, Linear)
         }
         if self.alters:
             changed |= {*found}
-            if any(found[one.target].type != FLOAT for one in feeding):
+            if any(found[wire.target].type != FLOAT for wire in feeding):
                 number = self.components.index(name)
                 yield f"if (error->raised) return refused(it, {number}, {INPUT}, -1);"
         for i, (port, (target, place)) in enumerate(
@@ -744,7 +861,8 @@ class Text:
             if port.maximum is not None:
                 tests.append(f"{place.text} <= {number_in_c(_as(place, port.maximum))}")
             if port.choices:
-                among = " || ".join(f"{place.text} == {int(one)}" for one in port.choices.values())
+                items = port.choices.values()
+                among = " || ".join(f"{place.text} == {int(item)}" for item in items)
                 tests.append(f"({among})")
             if tests:
                 text = tests[0] if len(tests) == 1 and not port.choices else " && ".join(tests)
@@ -752,7 +870,7 @@ class Text:
                 yield f"if (!({text})) return refused(it, {number}, {INPUT}, {i});"
 
     def value(self, connection: Connection, owner: str = "it") -> str:
-        """What arrives at the end of a connection, from the outputs of a simulation."""
+        """Return the value at the end of a connection, from the outputs of a simulation."""
         value = self.columns[connection.source].text.replace("it->", f"{owner}->", 1)
         target, change = connection.target, connection.transformation
         if isinstance(change, Mapped):
@@ -773,22 +891,23 @@ class Text:
             for a, b in change.pairs
         )
         body = f"(double value) {{\n{tests}    return ({of})value;\n}}"
-        head = self.mappings.setdefault(body, f"static {of} mapped_{len(self.mappings)}")
+        head = self._mappings.setdefault(body, f"static {of} mapped_{len(self._mappings)}")
         return f"{head.rpartition(' ')[2]}({value})"
 
     # Rows
 
     def show(self) -> str:
-        """What writes a row."""
+        """Return the function that writes a row."""
         values = [(f"row[{i}]", place.text) for i, place in enumerate(self.columns.values(), 1)]
-        return "/* A row: the time, and all inputs and outputs. */\n" + function(
+        return _function(
+            "Writes a row: the time, and all inputs and outputs.",
             "static void show(const simulation *it, double t, double row[])",
             ["row[0] = t;", *_copies(values)],
             (),
         )
 
     def _look(self) -> list[str]:
-        """What looks at a row, and what gives the indices at the end."""
+        """Return the functions that pass a row to the indices, and that give the indices."""
         if not self.indices:
             return []
         acts_at_end = int(self.plan.experiment.acting_row)
@@ -812,20 +931,25 @@ class Text:
             ]
             n += sum(map(len, reducer.results.values()))
         lines.append("it->looked = t;")
+        give_lines = [
+            "Error noted = {0}, *error = &noted;",
+            "int raised = 0;",
+            *gives,
+            "return raised + noted.raised;",
+        ]
         return [
-            "/* Lets indices look at a row. */\n"
-            + function("static void look(simulation *it, double t)", lines, ()),
-            f"enum {{ INDICES = {n} }};\n\n"
-            "/* The indices of the rows so far, what is not there is not a number; how many have\n"
-            " * raised. */\n"
-            + function(
+            _function(
+                "Passes the current row to the indices.",
+                "static void look(simulation *it, double t)",
+                lines,
+                (),
+            ),
+            f"enum {{ INDICES = {n} }};",
+            _function(
+                "Gives the indices of the rows so far, NaN for missing ones. Returns how many have "
+                "raised an error.",
                 "EXPORTED int indices(const simulation *it, double found[])",
-                [
-                    "Error noted = {0}, *error = &noted;",
-                    "int raised = 0;",
-                    *gives,
-                    "return raised + noted.raised;",
-                ],
+                give_lines,
                 (),
             ),
         ]
@@ -839,7 +963,8 @@ class Text:
 
     def _run(self) -> Iterator[str]:
         looks = ["look(it, t);"] * bool(self.indices)
-        yield "/* Keeps the row after k steps. */\n" + function(
+        yield _function(
+            "Writes the row after k steps, and passes it to the indices.",
             "static void keep(simulation *it, int k, double rows[])",
             [
                 "const double t = time_after(it, k);",
@@ -874,17 +999,23 @@ class Text:
                 "    it->made = k + 1;",
                 "}",
             ]
-        # Steps look at what those before them have computed.
-        yield function(_RUN, [*lines, *self._unsound(), "return 0;"], ())
+        # Checks at the beginning of a step cover the values of the step before.
+        yield _function(
+            "Makes steps up to number `until`, and rows unless `rows` is NULL. Returns 1 if a "
+            "component refuses.",
+            "EXPORTED int run(simulation *it, int until, double rows[])",
+            [*lines, *self._unsound(), "return 0;"],
+            (),
+        )
 
     def _steps(self) -> list[str]:
         passing, parts = self.stages.passing, []
         if passing is not None:
-            parts.append(self._made("pass", "Lets values of t_k pass", passing, ()))
+            parts.append(self._step_function("pass", "Passes values of t_k on", passing, ()))
         end = self._end("it->start_time")
         begin = ["const double h = length_of(it, k, 1);"]
         if not self.is_hosted:
-            # What a host that counts its steps reaches.
+            # The end of a step for a host that counts its steps.
             begin.append("const int is_counted = k < it->full_steps && it->start_time == 0.0;")
             end = f"is_counted ? time_after(it, k + 1) : {end}"
         begin.append(f"const double end = {end};")
@@ -892,11 +1023,11 @@ class Text:
         doc = "Makes the step after the k-th"
         if self.is_quick:
             parts.append(self._sound())
-        parts.append(self._made("make_step", doc, self.stages.stepping, begin))
+        parts.append(self._step_function("make_step", doc, self.stages.stepping, begin))
         return parts
 
     def _unsound(self) -> list[str]:
-        """What refuses what a run cannot go on from, where calls do not say so."""
+        """Return the check of outputs and states, for a program that checks them together."""
         return ["if (!is_sound(it, error)) return refused(it, 0, AT_STEP, 0);"] * self.is_quick
 
     def _end(self, start: str) -> str:
@@ -904,7 +1035,7 @@ class Text:
         return self.emitter.call(kind.euler["end_of_step"], [start, "t", "h"])
 
     def _sound(self) -> str:
-        """Check outputs and states of all components."""
+        """Return the function that checks outputs and states of all components."""
         tests = ["!error->raised"]
         for name, member in self.members.items():
             if (kind := self.kind(name)).is_checked:
@@ -912,14 +1043,17 @@ class Text:
             tests += filter(None, [kind.are_finite(f"it->{member}.outputs")])
             tests += filter(None, [kind.is_sound(f"it->{member}.state")] * kind.steps)
         lines = [f"int is_sound = {tests[0]};", *(f"is_sound &= {test};" for test in tests[1:])]
-        return "/* Whether outputs and states are sound. */\n" + function(
+        return _function(
+            "Tells whether all outputs and states are sound.",
             "static inline int is_sound(const simulation *it, const Error *error)",
             [*lines, "return is_sound;"],
         )
 
-    def _made(self, name: str, doc: str, found: Sequence[Stage], begin: Sequence[str]) -> str:
+    def _step_function(
+        self, name: str, doc: str, stages: Sequence[Stage], begin: Sequence[str]
+    ) -> str:
         lines = [*begin]
-        for stage in found:
+        for stage in stages:
             inner = list(self._stage(stage))
             if (when := stage.decimation) is not None:
                 k = "(k + 1)" if when.at_end else "k"
@@ -927,17 +1061,18 @@ class Text:
                 lines += [test, *(f"    {line}" for line in inner), "}"]
             else:
                 lines += inner
-        if found is self.stages.stepping and found[-1].decimation is not None:
-            # The last stage, which looks at all, is not in every step.
+        if stages is self.stages.stepping and stages[-1].decimation is not None:
+            # The last stage, which checks the values, is not part of every step.
             lines += self._unsound()
-        return f"/* {doc}; whether a component refuses. */\n" + function(
+        return _function(
+            f"{doc}. Returns 1 if a component refuses.",
             f"static int {name}(simulation *it, int k, double t, Error *error)",
             [*lines, "return 0;"],
             ("k", "t", "error", *(("h", "end") if begin else ())),
         )
 
     def _stage(self, stage: Stage) -> Iterator[str]:
-        values = [(self.columns[one.target].text, self.value(one)) for one in stage.connections]
+        values = [(self.columns[wire.target].text, self.value(wire)) for wire in stage.connections]
         yield from _copies(values, self._arrays)
         shown = {
             port: place
@@ -946,36 +1081,36 @@ class Text:
             for port, place in self._outputs(name).items()
         }
         yield from _copies(
-            [(self.columns[one].text, shown[one].text) for one in stage.shows if one in shown]
+            [(self.columns[port].text, shown[port].text) for port in stage.shows if port in shown]
         )
         for visit in stage.visits:
             yield from self._visited(visit, stage.decimation.every if stage.decimation else 1)
         if stage is self.stages.stepping[-1] and stage.decimation is None:
-            # What was just written is slow to read in another way: outputs are better looked at
-            # before they are computed again.
+            # Numbers that were just written are slow to read in vectors: check outputs before they
+            # are computed again.
             yield from self._unsound()
         for visit in stage.visits:
             kind = self.kind(visit.component)
-            is_stale = kind.follows_inputs and not (kind.said.is_sampled and visit.steps)
+            is_stale = kind.follows_inputs and not (kind.behaviour.is_sampled and visit.steps)
             if is_stale and self.reads(visit):
                 is_early = bool(kind.foreseen) and visit.steps and not visit.takes
-                # What is shown of a slow one may not be computed again before.
+                # The shown outputs of a slow component must not be computed again before.
                 is_early &= visit.component not in self.slow
-                yield from self.evaluated(visit.component, "foresee" if is_early else "evaluate")
+                yield from self._evaluated(visit.component, "foresee" if is_early else "evaluate")
 
     def _visited(self, visit: Visit, every: int) -> Iterator[str]:
         name, kind = visit.component, self.kind(visit.component)
-        member, said = f"it->{self.members[name]}", kind.said
+        member, behaviour = f"it->{self.members[name]}", kind.behaviour
         if visit.takes:
             yield from self.checked_inputs(name)
-            if said.derived and said.takes("derive", "inputs"):
+            if kind.derives_from_inputs:
                 yield f"{member}.underived = 1;"
         if not visit.steps:
             return
-        if said.is_sampled:
+        if behaviour.is_sampled:
             timed = [f"{member}.time = t;"] * kind.is_timed
-            timed += [f"{member}.underived = 1;"] * bool(timed and said.takes("derive", "t"))
-            anew = list(self.evaluated(name))
+            timed += [f"{member}.underived = 1;"] * bool(timed and behaviour.takes("derive", "t"))
+            anew = list(self._evaluated(name))
             lines = timed if visit.takes else [*timed, *anew]
             if timed:
                 yield f"if ({member}.time != t) {{"
@@ -999,33 +1134,135 @@ class Text:
         if kind.is_checked:
             yield self._refusal(name, STEP)
 
-    def evaluated(self, name: str, how: str = "evaluate") -> Iterator[str]:
-        """Compute the outputs of a component."""
+    def _evaluated(self, name: str, how: str = "evaluate") -> Iterator[str]:
+        """Yield statements that compute the outputs of a component."""
         kind = self.kind(name)
         yield f"{kind.name}_{how}(&it->{self.members[name]}, error);"
         if kind.is_checked:
             yield self._refusal(name, OUTPUTS)
 
     def reads(self, visit: Visit) -> bool:
-        """Whether one of the outputs is read that the component computes."""
+        """Tell whether a computed output of the component is read in a visit."""
         component = self.plan.system.components[visit.component]
         outputs = (port.name for port in self.kind(visit.component).ports["output"])
         return bool(visit.types_read(component, outputs))
 
+    # Events
+
+    def _event_tables(self) -> str:
+        """Return the tables of numbers that a host and events can set or read."""
+        fed = {wire.target: wire.transformation for wire in self.plan.system.connections}
+        places = {name: i for i, name in enumerate(self.columns)}
+        inputs = []
+        for name in self.inputs:
+            change = fed.get(name)
+            factor, offset = Linear.UNCHANGED
+            if isinstance(change, Linear):
+                factor, offset = change.factor, change.offset
+            numbers = f"{number_in_c(factor)}, {number_in_c(offset)}"
+            inputs.append(f"    {{{places[name]}, {int(name in fed)}, {numbers}}},")
+        components = {name: i for i, name in enumerate(self.components)}
+        settables = [
+            f"    {{{_number(place)}, {components[name.component]}, {self.inputs.get(name, -1)}}},"
+            for name, place in self.parameters.items()
+        ]
+        return _EVENT_TABLES.format(
+            columns="\n".join(f"    {_number(place)}," for place in self.columns.values()),
+            inputs="\n".join(inputs),
+            settables="\n".join(settables),
+            n_components=len(components),
+            n_inputs=len(inputs),
+            n_settables=len(settables),
+        )
+
+    def _event_text(self) -> str:
+        """Return the part of the program that makes events happen."""
+        source = _EVENTS.read_text(encoding="utf-8").strip()
+        changes = (self._retune(), self._restart(), self._restarts())
+        return "\n\n".join([_PASSING[self.passes], *changes, source])
+
+    def _retune(self) -> str:
+        """Return the function that adopts parameters of a component that changed between steps."""
+        cases = {}
+        for i, (name, member) in enumerate(self.members.items()):
+            kind = self.kind(name)
+            lines = [
+                f"{kind.name}_adopt(&it->{member}, error);",
+                f"if (error->raised) return refused(it, {i}, AT_SET, 0);",
+            ]
+            if self.passes and (kind.follows_inputs or kind.follows_parameters):
+                # Outputs that depend on the parameters change at once.
+                lines += self._evaluated(name)
+            cases[i] = [*lines, "return 0;"]
+        doc = "Adopts changed parameters of a component. Returns 1 if it refuses them."
+        return _switch(doc, "retune(simulation *it, int component)", cases)
+
+    def _restart(self) -> str:
+        cases = {
+            i: [
+                f"feed_{i}(it, now, error);",
+                *([f"it->{member}.has_noise = 0;"] * bool(self.kind(name).behaviour.draws)),
+                f"return start_{i}(it, t, error);",
+            ]
+            for i, (name, member) in enumerate(self.members.items())
+        }
+        doc = "Restarts a component with its current inputs. Returns 1 if it refuses."
+        head = "restart(simulation *it, const simulation *now, int component, double t)"
+        return _switch(doc, head, cases)
+
+    def _restarts(self) -> str:
+        rows = (
+            f"    times[{i}] = it->{member}.has_restarted ? it->{member}.restarted : -1.0;\n"
+            if self.kind(name).keeps_restart
+            else f"    times[{i}] = -1.0;\n"
+            for i, (name, member) in enumerate(self.members.items())
+        )
+        return (
+            "/* Gives the times at which guards first reset states [s]; -1: never. */\n"
+            "EXPORTED void restarts(const simulation *it, double times[]) {\n"
+            f"    (void)it;\n{''.join(rows)}}}"
+        )
+
+
+def _function(
+    doc: str, head: str, lines: Sequence[str], arguments: Sequence[str] = ("error",)
+) -> str:
+    """Return a C function with a comment; arguments that it does not use are marked so."""
+    comment = "\n * ".join(wrap(doc, 94))
+    return f"/* {comment} */\n{function(head, lines, arguments)}"
+
+
+def _number(place: Place) -> str:
+    return (
+        f"{{offsetof(simulation, {place.text.removeprefix('it->')}), {int(place.type != FLOAT)}}}"
+    )
+
+
+def _switch(doc: str, head: str, cases: Mapping[int, Sequence[str]]) -> str:
+    """Return a C function with a case for each component."""
+    body = "".join(
+        f"    case {i}:\n" + "".join(f"        {line}\n" for line in lines)
+        for i, lines in cases.items()
+    )
+    return (
+        f"/* {doc} */\nstatic int {head} {{\n    Error noted = {{0}}, *error = &noted;\n"
+        f"    switch (component) {{\n{body}    }}\n    return 0;\n}}"
+    )
+
 
 def _waiting(functions: Iterable[tree.Function]) -> set[tree.Function]:
-    """Those that may go round in a loop for ever, or call one that may.
+    """Return the functions with loops that might not end, and their callers.
 
     Args:
-        functions: each after those that it calls.
+        functions: functions, each after those that it calls.
 
     """
-    found = set[tree.Function]()
-    for one in functions:
-        loops = any(isinstance(part, tree.While) for part in tree.statements_in(one.body))
-        if loops or any(call.function in found for call in tree.calls_in(one.body)):
-            found.add(one)
-    return found
+    waiting = set[tree.Function]()
+    for each in functions:
+        loops = any(isinstance(part, tree.While) for part in tree.statements_in(each.body))
+        if loops or any(call.function in waiting for call in tree.calls_in(each.body)):
+            waiting.add(each)
+    return waiting
 
 
 def _as(place: Place, value: float) -> float:
@@ -1037,7 +1274,7 @@ def _lower(name: str) -> str:
 
 
 def _arrays(type_: Type, text: str) -> Iterator[tuple[str, Array]]:
-    """The arrays of numbers in a value, and where they lie."""
+    """Yield the places and types of the arrays of numbers in a value."""
     if isinstance(type_, Array) and not members(type_.item):
         yield text, type_
         return
@@ -1045,22 +1282,22 @@ def _arrays(type_: Type, text: str) -> Iterator[tuple[str, Array]]:
         yield from _arrays(part, text + suffix)
 
 
-#: A number of an array: the array, and its place.
+#: An element of an array: a cast, the array, and the index.
 _ELEMENT = re.compile(r"(\(int\))?(.+)\[(\d+)\]")
 
 
 def _copies(values: Sequence[tuple[str, str]], arrays: Mapping[str, str] = {}) -> Iterator[str]:
-    """Assignments, whole arrays in one and neighbours in a loop."""
+    """Yield assignments: one for a whole array, and a loop for neighbours."""
     run: list[tuple[str, str]] = []
-    for one in [*values, ("", "")]:
-        if run and not _follows(run[-1], one):
+    for assignment in [*values, ("", "")]:
+        if run and not _follows(run[-1], assignment):
             yield from _copied(run, arrays)
             run = []
-        run.append(one)
+        run.append(assignment)
 
 
 def _follows(one: tuple[str, str], other: tuple[str, str]) -> bool:
-    """Whether two assignments are of neighbours."""
+    """Tell whether two assignments are of neighbours in arrays."""
     for before, after in zip(one, other, strict=True):
         a, b = _ELEMENT.fullmatch(before), _ELEMENT.fullmatch(after)
         if a is None or b is None or a.groups()[:2] != b.groups()[:2]:
@@ -1085,15 +1322,15 @@ def _copied(run: Sequence[tuple[str, str]], arrays: Mapping[str, str]) -> Iterat
 
 
 def _distinct(names: Sequence[str]) -> list[str]:
-    """Names of members for components, which may have dots and the like in theirs."""
-    found: list[str] = []
+    """Return distinct names of members for components, whose names may have dots."""
+    distinct: list[str] = []
     for name in names:
         text = in_c(re.sub(r"\W", "_", name, flags=re.ASCII))
         text = text if text[0].isalpha() else f"of_{text}"
-        while text in found or text in _TAKEN:
+        while text in distinct or text in _TAKEN:
             text += "_"
-        found.append(text)
-    return found
+        distinct.append(text)
+    return distinct
 
 
 #: Other members of the simulation.

@@ -29,8 +29,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
-from orchestrator.program.reducing import looking_at
-from orchestrator.program.writer import Text
+from orchestrator.program.writer import Text, indices_of
 from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import (
@@ -143,7 +142,7 @@ class _Programs:
         indices = [*INDICES, *chain.from_iterable(file.indices for file in self._own)]
         reducers = [*dict.fromkeys(index.reducer for index in indices), *WATCHED]
         plan = make_plan(system, Experiment(step * 2.0**20, step, order))
-        looking = [[*looking_at(system, loop, reducers)] for loop in self.loops]
+        looking = [[*indices_of(system, loop, reducers)] for loop in self.loops]
         text = Text(plan, self._definitions, [*chain(*looking)], is_quick=True)
         groups, watched, first = [], [], 0
         for (_, prefix), looks in zip(prefixed(self.loops), looking, strict=True):

@@ -20,9 +20,8 @@ from fmpy.simulation import instantiate_fmu
 from fmus.kinds import NATIVE, PYTHON
 from orchestrator import simulate
 from orchestrator.cosim import Experiment
-from orchestrator.exchange.hosts import comparison
-from orchestrator.exchange.hosts.comparison import HOSTS
-from orchestrator.exchange.hosts.here import real_outputs
+from orchestrator.exchange import hosts
+from orchestrator.exchange.hosts import HOSTS, real_outputs
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
@@ -243,7 +242,7 @@ def test_no_tool_ends_the_run_as_a_success(fmu, host: str, kind: str):
     system = closed_loop(fmu(kind, "AuvPlant").parent, wrong)
     experiment = Experiment(8.0, 0.02, "jacobi")
     try:
-        rows, *_ = comparison._ran(HOSTS[host], host, system, experiment, print)
+        rows, *_ = hosts._run(HOSTS[host], host, system, experiment, print)
     except InputError:
         return
     # It looks at no status. Its page says so; nothing moves after the refusal.

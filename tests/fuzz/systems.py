@@ -68,8 +68,7 @@ from orchestrator.cosim import (
 )
 from orchestrator.cosim.connection import can_feed
 from orchestrator.live import module
-from orchestrator.live.module import MODULE
-from orchestrator.live.programs import OF_PROGRAM, Source
+from orchestrator.live.module import MODULE, OF_PROGRAM, Source
 from orchestrator.machine.compilers import compiler_for, platforms
 from orchestrator.machine.errors import InputError
 from orchestrator.program.writer import Equations, Text

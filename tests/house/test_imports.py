@@ -43,8 +43,8 @@ ALLOWED = {
     },
 }  # fmt: skip
 
-#: What runs in environments of other tools, and imports nothing of ours.
-FOREIGN = ("exchange", "hosts", "drivers")
+#: Runs in environments of other tools, and imports nothing of this package.
+FOREIGN = ("exchange", "drivers")
 
 #: What else may be imported of `fmus`: how FMUs run, and PythonFMU, stays out of the process.
 DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|language\.build\.Untranslatable)(\.|$)")

@@ -13,6 +13,7 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
+from orchestrator.program.files import _PASSAGES
 from orchestrator.runs.result import Result
 from orchestrator.runs.tables import read_columns, read_rows
 from support.texts import mentions
@@ -146,6 +147,15 @@ def test_single_precision_has_no_double_and_the_same_motion(programs: Path, name
     for one in moved:
         found = rows[:, 1 + columns.index(one)]
         np.testing.assert_allclose(found, result[one], rtol=0.0, atol=2e-4, err_msg=one)
+
+
+@pytest.mark.parametrize("passage", _PASSAGES)
+def test_passages_for_double_precision_are_replaced(programs: Path, passage: str):
+    double, single = (
+        sources(programs / name)[0].read_text(encoding="utf-8") for name in ("fig4", "fig4-single")
+    )
+    assert passage in double
+    assert passage not in re.sub(r"(?<=\d)f\b", "", single).replace("fabsf", "fabs")
 
 
 @needs_gcc

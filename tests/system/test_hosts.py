@@ -18,9 +18,8 @@ from fmus.kinds import FMI_VERSIONS
 from orchestrator.commands import exchange
 from orchestrator.commands.main import main
 from orchestrator.cosim import Experiment, PortName, System
-from orchestrator.exchange.hosts import comparison, here
-from orchestrator.exchange.hosts.comparison import HOSTS, Host, compare
-from orchestrator.exchange.hosts.environments import folder_of, is_whole
+from orchestrator.exchange import hosts
+from orchestrator.exchange.hosts import HOSTS, Host, compare, folder_of, is_whole
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_scenario
@@ -33,7 +32,7 @@ from support.tiers import slow
 LIBDIR = sysconfig.get_config_var("LIBDIR")
 
 
-#: Hosts beside this program, and hosts with environments of their own.
+#: Hosts installed next to this program, and hosts with their own environments.
 BESIDE = [name for name, host in HOSTS.items() if not host.pins]
 APART = [name for name, host in HOSTS.items() if host.pins]
 
@@ -124,9 +123,9 @@ def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
     system = chain(tmp_path, ["clock", "a", "b", "sum"][:: (1, -1)[place]])
     assert system.step is not None
     h = system.step
-    names = [f"{component}.{port}" for component, port, _ in here.real_outputs(system)]
+    names = [f"{component}.{port}" for component, port, _ in hosts.real_outputs(system)]
     experiment = Experiment(12 * h, h, "jacobi", 0.0)
-    rows, *_ = comparison._ran(HOSTS[host], "", system, experiment, str)
+    rows, *_ = hosts._run(HOSTS[host], "", system, experiment, str)
     before, after = (dict(zip(names, row, strict=True)) for row in rows[-2:])
     given = (after["sum.x"] - before["sum.x"]) / h
     assert (after["clock.t"] - h - given) / h == LATE.get(host, (2, 2))[place]
@@ -232,7 +231,7 @@ def test_driver_refuses_what_it_does_not_pass_on(dist: Path, changed: dict[str, 
 
 
 def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkeypatch):
-    monkeypatch.setitem(HOSTS, "ghost", Host("no-such-package", here.ecos))
+    monkeypatch.setitem(HOSTS, "ghost", Host("no-such-package", hosts.ecos))
     verdicts = list(compare(closed_loop(dist), ["ghost", "fmpy-ssp"], 50, 0.02))
     assert "not installed" in str(verdicts[0].failure)
     assert verdicts[1].failure is None
@@ -241,21 +240,21 @@ def test_missing_host_is_reported_and_does_not_end_the_others(dist: Path, monkey
 def test_host_is_installed_when_it_is_first_run(dist: Path, monkeypatch):
     """One that cannot be installed does not end the others."""
 
-    def python(pins: Sequence[str], told: Callable[[], object]) -> Path:
-        told()
+    def python(pins: Sequence[str], hear: Callable[[], object]) -> Path:
+        hear()
         if pins == ["fmpy==1"]:
             raise InputError("no such version")
         return Path(sys.executable)
 
-    monkeypatch.setattr(comparison, "python_with", python)
+    monkeypatch.setattr(hosts, "python_with", python)
     for pin in ("fmpy==1", "fmpy==2"):
         monkeypatch.setitem(HOSTS, pin, replace(HOSTS["fmpy"], pins=[pin]))
-    told: list[str] = []
-    verdicts = list(compare(closed_loop(dist), ["fmpy==1", "fmpy==2"], 50, 0.02, told=told.append))
+    heard: list[str] = []
+    verdicts = list(compare(closed_loop(dist), ["fmpy==1", "fmpy==2"], 50, 0.02, hear=heard.append))
     assert [verdict.failure for verdict in verdicts] == ["no such version", None]
     assert [verdict.package for verdict in verdicts] == ["fmpy 1", "fmpy 2"]
     assert verdicts[1].deviation <= 1e-9
-    assert len(told) == 2 and "fmpy 2" in told[1]
+    assert len(heard) == 2 and "fmpy 2" in heard[1]
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import { build } from "esbuild";
 
 const [folder] = process.argv.slice(2);
 
-/** Bundles an entry, and returns the names of the packages in it. */
+/** Bundles an entry; returns the names of the packages in it. */
 async function bundle(entry, outfile, options) {
   const { metafile } = await build({
     entryPoints: [`src/${entry}`],
@@ -36,7 +36,7 @@ const licences = [...new Set(names)].sort().map((name) => {
   const place = `node_modules/${name}`;
   const { version, license } = JSON.parse(readFileSync(`${place}/package.json`, "utf8"));
   const file = readdirSync(place).find((path) => /^licen[cs]e/i.test(path));
-  // ogl has its licence in its README, under a heading.
+  // The licence of ogl is in its README, under a heading.
   const text = file
     ? readFileSync(`${place}/${file}`, "utf8")
     : readFileSync(`${place}/README.md`, "utf8").split(`\n## ${license}\n`)[1];

@@ -1,36 +1,35 @@
-// What scripts may ask of the page: `auvfmu.set({"controller.k_d": 30})`, `auvfmu.csv()`.
+// The interface for scripts: `auvfmu.set({"controller.k_d": 30})`, `auvfmu.csv()`.
 
-import { Refusal } from "./experiment";
 import { fromHash, toHash } from "./link";
 import { eventsOf, presetOf, type Settings, untouched } from "./settings";
-import type { Engine } from "./simulate";
+import { type Engine, Refusal } from "./simulate";
 import { csv } from "./text";
 import type { Data, Result, Value } from "./types";
 
 export interface Api {
   /**
-   * Changes settings, runs, and draws. The names are the ones of links: `component.parameter`,
-   * `stop_time`, `step`, `events`, which begin without edits, `hide`, `vehicle`, and `preset`, which
-   * begins as it is. Settings that are refused change nothing.
+   * Changes settings, runs, and draws. Names are those in links: `component.parameter`,
+   * `stop_time`, `step`, `events` (which resets edits of events), `hide`, `vehicle`, and `preset`
+   * (which resets all settings). Refused settings change nothing.
    */
   set(changes: Readonly<Record<string, Value>>): Promise<void>;
-  /** The rows of the scenario's own loop, as result.csv has them. */
+  /** Returns the rows of the scenario's own loop, in the format of result.csv. */
   csv(): Promise<string>;
 }
 
-/** What keeps the settings: the page, or anything where there is none. */
-export interface Keeper {
+/** Owner of the settings: the page, or a plain object without a page. */
+interface Keeper {
   readonly settings: Settings;
   apply(settings: Settings): void;
 }
 
-/** Settings with changes. */
+/** Returns settings with changes. */
 function changed(
   settings: Settings,
   data: Data,
   changes: Readonly<Record<string, Value>>,
 ): Settings {
-  // A preset that is named begins as it is.
+  // A named preset resets all settings.
   const fields = new URLSearchParams("preset" in changes ? "" : toHash(settings, data).slice(1));
   if ("events" in changes) {
     for (const key of [...fields.keys()]) if (key.startsWith("events.")) fields.delete(key);
@@ -41,7 +40,7 @@ function changed(
   return found.settings;
 }
 
-/** A run of each loop that is shown, or of the scenario's own. */
+/** Runs each loop that is shown; if all are hidden, the scenario's own. */
 function* runs(data: Data, engine: Engine, settings: Settings): Generator<Result> {
   const { preset, values, stopTime, step, hidden } = settings;
   const { loops } = presetOf(data, preset) ?? data.presets[0];
@@ -51,12 +50,12 @@ function* runs(data: Data, engine: Engine, settings: Settings): Generator<Result
   }
 }
 
-/** The interface for scripts over whatever keeps the settings. */
+/** Makes the interface for scripts. */
 export function makeApi(data: Data, engine: Engine, keeper: Keeper): Api {
   return {
     async set(changes) {
       const settings = changed(keeper.settings, data, changes ?? {});
-      // All of them, or one of them refuses.
+      // A run that is refused throws before the settings are applied.
       Array.from(runs(data, engine, settings));
       keeper.apply(settings);
     },
@@ -67,7 +66,7 @@ export function makeApi(data: Data, engine: Engine, keeper: Keeper): Api {
   };
 }
 
-/** The same without a page. */
+/** Makes the interface without a page. */
 export function apiWithoutPage(data: Data, engine: Engine): Api {
   const opened = presetOf(data, data.opened) ?? data.presets[0];
   let settings = untouched(opened);

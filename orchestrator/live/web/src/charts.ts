@@ -1,12 +1,13 @@
-// The charts: one small uPlot for each signal, with one cursor in all of them.
+// Charts: one small uPlot for each signal, with a common cursor.
 
 import uPlot from "uplot";
+import { make, numberField } from "./dom";
 import { swatch } from "./legend";
 import type { Lines, Panel, Section, Style } from "./panels";
-import { entered } from "./text";
+import { entered, short, tick } from "./text";
 import { property } from "./theme";
 
-/** Something that happens: from, until [s], and what. */
+/** An event, with its beginning and end [s]. */
 export interface Mark {
   readonly from: number;
   readonly until: number;
@@ -26,7 +27,7 @@ const DASHES: Record<Style, number[]> = {
 };
 const WIDTH = 1.5;
 
-/** Share of a limit from which on it is in sight. */
+/** Share of a limit above which the chart includes it. */
 const NEAR = 0.5;
 
 const PROPERTIES: Record<Style, string> = {
@@ -37,24 +38,6 @@ const PROPERTIES: Record<Style, string> = {
   "second-of-all": "--reference",
 };
 
-/** A number in few characters. */
-export function short(value: number): string {
-  if (!Number.isFinite(value)) return "–";
-  const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-3 || size >= 1e5)) return value.toExponential(1).replace("-", "−");
-  const digits = size >= 100 ? 0 : size >= 10 ? 1 : size >= 1 ? 2 : 3;
-  return value.toFixed(digits).replace("-", "−");
-}
-
-/** A number on an axis: all its digits, and few characters. */
-export function tick(value: number): string {
-  const rounded = Number(value.toPrecision(6));
-  const size = Math.abs(rounded);
-  const isLong = size !== 0 && (size < 1e-4 || size >= 1e5);
-  const text = isLong ? rounded.toExponential().replace("e+", "e") : rounded.toString();
-  return text.replaceAll("-", "−");
-}
-
 function longestOf(texts: readonly string[]): number {
   return Math.max(0, ...texts.map(({ length }) => length));
 }
@@ -62,7 +45,7 @@ function longestOf(texts: readonly string[]): number {
 class Chart {
   readonly root: HTMLElement;
   readonly #panel: Panel;
-  readonly #values: HTMLElement[] = [];
+  readonly #values: readonly HTMLElement[];
   readonly #plot: uPlot;
   #lines: Lines = { time: new Float64Array(0), values: [] };
   #marks: readonly Mark[] = [];
@@ -74,26 +57,20 @@ class Chart {
 
   constructor(panel: Panel, scrub: (time: number) => void) {
     this.#panel = panel;
-    this.root = document.createElement("figure");
-    this.root.className = "chart pending";
+    this.#values = panel.styles.map((style, k) => {
+      const value = make("span", `value ${style}`);
+      value.title = panel.names[k];
+      return value;
+    });
+    const readout = make("span", "readout", ...this.#values);
+    readout.setAttribute("aria-hidden", "true");
     const caption = document.createElement("figcaption");
     caption.innerHTML = `<span class="name">${panel.title} <span class="unit">${panel.unit && `[${panel.unit}]`}</span></span>`;
-    const readout = document.createElement("span");
-    readout.className = "readout";
-    readout.setAttribute("aria-hidden", "true");
-    panel.styles.forEach((style, k) => {
-      const value = document.createElement("span");
-      value.className = `value ${style}`;
-      value.title = panel.names[k];
-      readout.append(value);
-      this.#values.push(value);
-    });
     caption.append(readout);
-    const host = document.createElement("div");
-    host.className = "plot";
+    const host = make("div", "plot");
     host.setAttribute("role", "img");
     host.setAttribute("aria-label", `${caption.textContent} over time: ${panel.names.join(", ")}`);
-    this.root.append(caption, host);
+    this.root = make("figure", "chart pending", caption, host);
     this.#plot = new uPlot(this.#options(), [new Float64Array(0)], host);
     const point = (event: PointerEvent) => {
       const { left } = this.#plot.over.getBoundingClientRect();
@@ -118,7 +95,7 @@ class Chart {
 
   #options(): uPlot.Options {
     const stroke = (name: string) => () => property(name);
-    // By itself, uPlot keeps the colours that points had at first.
+    // A function, as uPlot would keep the first colours of points.
     const ofPoint = (_: uPlot, k: number) => property(PROPERTIES[this.#panel.styles[k - 1]]);
     const axis = {
       stroke: stroke("--muted"),
@@ -146,7 +123,7 @@ class Chart {
         { ...axis, size: TIME_AXIS, space: 55 },
         {
           ...axis,
-          // Labels come as null before there are any.
+          // `labels` is null before there are any.
           size: (_, labels) => Math.max(VALUE_AXIS, 12 + 6 * longestOf(labels ?? [])),
           space: 26,
           values: (_, found) => found.map(tick),
@@ -168,12 +145,12 @@ class Chart {
     };
   }
 
-  /** From the time that is wanted on, if the run is not over by then. */
+  /** Returns the range of times, from the chosen beginning if the run lasts longer. */
   #times(low: number, high: number): [number, number] {
     return [this.#from < high ? Math.max(low, this.#from) : low, high];
   }
 
-  /** Where the values are; a limit is in sight when they are near it. */
+  /** Returns the range of values, with limits that they come near to. */
   #range(low: number, high: number): [number, number] {
     for (const limit of this.#lines.limits ?? []) {
       if (Math.max(high, -low) > NEAR * Math.abs(limit)) {
@@ -226,7 +203,7 @@ class Chart {
     ctx.restore();
   }
 
-  /** Writes the name of an event at its line, if there is room after the last one; where it ends. */
+  /** Writes the name of an event at its line if there is room; returns where the last name ends. */
   #name(label: string, x: number, after: number): number {
     const { ctx, bbox } = this.#plot;
     const ratio = uPlot.pxRatio;
@@ -247,7 +224,7 @@ class Chart {
     return hasRoom ? left + width : after;
   }
 
-  /** Draws it even where it is out of sight. */
+  /** Draws the chart even if it is out of sight. */
   print(): void {
     if (!this.root.hidden) this.#redraw();
   }
@@ -260,9 +237,12 @@ class Chart {
     this.#lines = lines;
     this.#marks = marks;
     this.#named = named;
-    const isThere = lines.values.some((values) => values);
-    this.root.hidden = !isThere;
-    if (isThere && this.#visible) this.#redraw();
+    this.root.hidden = !lines.values.some((values) => values);
+    this.#redrawIfVisible();
+  }
+
+  #redrawIfVisible(): void {
+    if (this.#visible && !this.root.hidden) this.#redraw();
     else this.#stale = true;
   }
 
@@ -270,18 +250,17 @@ class Chart {
     this.#stale = false;
     this.root.classList.remove("pending");
     this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => withGaps(values))]);
-    // uPlot takes on its new scales in a microtask, too.
+    // uPlot also sets its new scales in a microtask.
     queueMicrotask(() => this.#point());
   }
 
-  /** Begins at another time [s], so that small values can be seen once large ones are over. */
+  /** Lets the chart begin at another time [s], so that small values can be seen after large ones. */
   begin(from: number): void {
     this.#from = from;
-    if (this.#visible && !this.root.hidden) this.#redraw();
-    else this.#stale = true;
+    this.#redrawIfVisible();
   }
 
-  /** Colours have changed. */
+  /** Draws again with other colours. */
   repaint(): void {
     this.#plot.redraw(false);
   }
@@ -291,7 +270,7 @@ class Chart {
     if (this.#visible && !this.root.hidden && !this.#stale) this.#point();
   }
 
-  /** Puts the cursor and the values at the time that is shown. */
+  /** Moves the cursor, and the values in the caption, to the current time. */
   #point(): void {
     const left = this.#plot.valToPos(this.#time, "x");
     this.#plot.setCursor({ left: Number.isFinite(left) ? left : -10, top: 0 }, false);
@@ -304,13 +283,13 @@ class Chart {
   }
 }
 
-/** Values as uPlot takes them, to which null is a gap, and NaN is not. */
+/** Returns values for uPlot, in which gaps are null instead of NaN. */
 function withGaps(values: Float64Array | undefined): Float64Array | (number | null)[] {
   if (!values?.some(Number.isNaN)) return values ?? [];
   return Array.from(values, (value) => (Number.isNaN(value) ? null : value));
 }
 
-/** uPlot follows the player, not the mouse by itself. */
+/** Turns uPlot's own mouse handling off: the cursor follows the player. */
 function silent(): uPlot.Cursor.Bind {
   const off = () => null;
   return {
@@ -324,7 +303,7 @@ function silent(): uPlot.Cursor.Bind {
   };
 }
 
-/** The last row that is not after a time. */
+/** Returns the last row that is not after a time. */
 export function rowAt(times: Float64Array, time: number): number {
   let [low, high] = [0, times.length - 1];
   while (low < high) {
@@ -335,7 +314,7 @@ export function rowAt(times: Float64Array, time: number): number {
   return Math.max(low, 0);
 }
 
-/** All sections of charts. */
+/** The sections of charts. */
 export class Charts {
   #charts: Chart[][] = [];
   #from: number;
@@ -351,47 +330,29 @@ export class Charts {
     });
   }
 
-  /** Makes the charts again. */
+  /** Makes all charts. */
   build(sections: readonly Section[]): void {
-    // uPlot keeps every plot that is not destroyed.
+    // uPlot keeps a reference to every plot until it is destroyed.
     for (const chart of this.#charts.flat()) chart.destroy();
     this.#host.replaceChildren();
     this.#charts = sections.map(({ title, note, named, panels }, place) => {
-      const section = document.createElement("section");
-      const heading = document.createElement("h2");
-      heading.textContent = title;
-      const aside = document.createElement("span");
-      aside.className = "note";
-      aside.textContent = note;
+      const aside = make("span", "note", note);
       const [{ names, styles }] = panels;
-      for (const [k, style] of named ? styles.entries() : []) {
-        const sample = document.createElement("span");
-        sample.className = "sample";
-        sample.innerHTML = swatch(style);
-        sample.append(names[k]);
-        aside.append(sample);
-      }
-      heading.append(aside);
+      if (named)
+        aside.append(...styles.map((style, k) => make("span", "sample", swatch(style), names[k])));
+      const heading = make("h2", "", title, aside);
       if (place === 0) heading.append(this.#beginning());
-      const row = document.createElement("div");
-      row.className = `charts of-${panels.length}`;
       const charts = panels.map((panel) => new Chart(panel, this.#scrub));
       for (const chart of charts) chart.begin(this.#from);
-      row.append(...charts.map(({ root }) => root));
-      section.append(heading, row);
-      this.#host.append(section);
+      const row = make("div", `charts of-${panels.length}`, ...charts.map(({ root }) => root));
+      this.#host.append(make("section", "", heading, row));
       return charts;
     });
   }
 
-  /** A field for the time at which all charts begin. */
+  /** Makes a field for the time at which all charts begin. */
   #beginning(): HTMLElement {
-    const whole = document.createElement("label");
-    whole.className = "from";
-    whole.title = "Charts begin at this time, so that small values can be seen";
-    const input = document.createElement("input");
-    input.type = "text";
-    input.inputMode = "decimal";
+    const input = numberField();
     input.value = String(this.#from);
     input.addEventListener("change", () => {
       const from = entered(input.value);
@@ -400,8 +361,9 @@ export class Charts {
       this.#from = from;
       for (const chart of this.#charts.flat()) chart.begin(from);
     });
-    whole.append("from ", input, " s");
-    return whole;
+    const label = make("label", "from", "from ", input, " s");
+    label.title = "Charts begin at this time, so that small values can be seen";
+    return label;
   }
 
   set(lines: readonly (readonly Lines[])[], marks: readonly Mark[]): void {

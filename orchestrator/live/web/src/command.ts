@@ -1,12 +1,12 @@
-// Settings as what a user types: `auv-fmu run`, and the files that it needs.
+// Settings as a command line of `auv-fmu run`, with the files that it needs.
 
 import { eventsOf, hasOtherEvents, type Settings } from "./settings";
 import type { Action, EventData, LoopData, Preset, Value } from "./types";
 
-/** Marks the end of a file in the shell. */
+/** Mark of the end of a file in the shell. */
 const END = "END";
 
-/** A command that makes the rows of a loop. */
+/** Returns the command that makes the rows of a loop. */
 export function commandLine(settings: Settings, preset: Preset, loop: LoopData): string {
   if (loop.scenario === undefined) return ownScenario(settings, preset, loop);
   const names = new Set(loop.parameters.map(({ name }) => name));
@@ -22,7 +22,7 @@ export function commandLine(settings: Settings, preset: Preset, loop: LoopData):
   return written(file, events || "events = []\n", [...words, "--events", file]);
 }
 
-/** The same for a loop that is only there to be compared: a scenario file of its own. */
+/** Returns the command for a loop that is only a comparison, with its own scenario file. */
 function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string {
   const file = fileName(`${preset.name}-${loop.label}`);
   const components = Object.entries(loop.components).map(
@@ -50,22 +50,22 @@ function ownScenario(settings: Settings, preset: Preset, loop: LoopData): string
   return written(file, text.trimEnd().concat("\n"), ["auv-fmu", "run", file]);
 }
 
-/** Writes a file in the shell, and then runs a command. */
+/** Returns shell commands that write a file, then run a command. */
 function written(file: string, text: string, command: readonly string[]): string {
   return `cat > ${file} <<'${END}'\n${text}${END}\n${command.join(" ")}`;
 }
 
-/** A file of the current folder, whose name needs no quotes. */
+/** Returns a file name that needs no quotes. */
 function fileName(stem: string): string {
   return `${stem.replaceAll(/[^\w.-]+/g, "-").replace(/^-/, "")}.toml`;
 }
 
-/** A word of a shell's command line. */
+/** Quotes a word for the shell, if needed. */
 function quoted(word: string): string {
   return /^[\w.=+/-]+$/.test(word) ? word : `'${word.replaceAll("'", "'\\''")}'`;
 }
 
-/** Events as a scenario file has them. */
+/** Returns events as tables of a scenario file. */
 export function toToml(events: readonly EventData[]): string {
   return events.map(toTable).join("\n");
 }
@@ -107,12 +107,12 @@ function list(names: readonly string[]): string {
   return `[${names.map((name) => literal(name)).join(", ")}]`;
 }
 
-/** A name as a key of TOML, in which dots would make tables. */
+/** Returns a name as a key of TOML, quoted if dots would make it a table. */
 function key(name: string): string {
   return /^[\w-]+$/.test(name) ? name : literal(name);
 }
 
-/** A value of TOML; JSON writes texts and truth values as TOML does. */
+/** Returns a value in TOML, which has the same texts and Booleans as JSON. */
 function literal(value: Value): string {
   return typeof value === "number" && value === 0 ? "0" : JSON.stringify(value);
 }

@@ -1,21 +1,16 @@
-// What shows runs: the path in space, the charts, the indices, and the player that moves them all.
+// The display of runs: paths in space, charts, indices, and the player for all of them.
 
 import { Charts, type Mark, rowAt } from "./charts";
-import { controlPoint, metrics, reference } from "./engine";
+import { element } from "./dom";
 import { IndicesTable } from "./indices_table";
 import { fillLegend } from "./legend";
 import { columnLines, columnSections, interleaved, lines, longest, sections } from "./panels";
 import { Player } from "./player";
 import { missing, Scene, type Track } from "./scene";
 import { fleetOf } from "./settings";
+import { controlPoint, metrics, reference } from "./signals";
 import { colourLines, palette, themeButton } from "./theme";
 import type { Common, Comparison, Run, ShownLoop, VehicleData } from "./types";
-
-export function element<T extends HTMLElement>(id: string): T {
-  const found = document.getElementById(id);
-  if (!found) throw new Error(`no element ${id}`);
-  return found as T;
-}
 
 export class Display {
   readonly player: Player;
@@ -24,10 +19,10 @@ export class Display {
   readonly #indices: IndicesTable;
   readonly #scene: Scene | undefined;
   #results: readonly (Run | undefined)[] = [];
-  /** The colour of the lines of a chosen vehicle; undefined: each controller has its own. */
+  /** Colour of the chosen vehicle's lines; undefined: each controller has its own. */
   #colour: string | undefined;
 
-  /** Charts begin at a time [s]. */
+  /** Charts begin at `from` [s]. */
   constructor(common: Common, from = 0) {
     this.#common = common;
     this.#scene = this.#makeScene();
@@ -67,7 +62,7 @@ export class Display {
     }
   }
 
-  /** Makes the charts of runs, by the loops in the order in which they are drawn. */
+  /** Makes the charts of runs, for loops in the order in which they are drawn. */
   build(comparison: Comparison, loops: readonly ShownLoop[]): void {
     const labels = loops.map(({ label }) => label);
     const fleet = fleetOf(comparison);
@@ -77,13 +72,13 @@ export class Display {
       fleet.length > 0 ? sections(labels, units, fleet.length) : columnSections(labels, columns),
     );
     this.#results = [];
-    // One of several vehicles is chosen.
+
     const select = element<HTMLSelectElement>("vehicle");
     (select.parentElement as HTMLElement).hidden = fleet.length < 2;
     select.replaceChildren(...fleet.map((name) => new Option(name)));
   }
 
-  /** Charts have the colour of the chosen vehicle, and of a single one, those of the controllers. */
+  /** Sets the colour of charts: of the chosen vehicle; undefined: of each controller. */
   paint(colour: string | undefined): void {
     this.#colour = colour;
     this.#paint();
@@ -98,10 +93,10 @@ export class Display {
   /**
    * Shows runs.
    *
-   * @param comparison that they belong to.
-   * @param loops in the order in which they are drawn.
-   * @param results of these; undefined: one is hidden.
-   * @param chosen the place of the vehicle that charts and indices are of.
+   * @param comparison how the runs are drawn.
+   * @param loops vehicles and controllers, in the order in which they are drawn.
+   * @param results runs of the loops; undefined: hidden.
+   * @param chosen number of the vehicle for charts and indices.
    */
   show(
     comparison: Comparison,
@@ -166,7 +161,7 @@ export class Display {
       ),
       zUp,
     });
-    // A vehicle's own reference has its colour.
+    // The legend names references unless all have the colours of their vehicles.
     const isNamed = colours.length === 0 || referenceColours.some((one) => !colours.includes(one));
     fillLegend(element("legend"), comparison, loops, [
       ...(hasReference && isNamed ? ["reference"] : []),
@@ -189,10 +184,10 @@ function trackOf(result: Run, vehicle: VehicleData): Track {
   };
 }
 
-/** The end of the name of the first parameter of a PathPlanner's waypoints. */
+/** End of the name of the first parameter of a PathPlanner's waypoints. */
 const WAYPOINT = ".waypoint[1].x";
 
-/** The points that each PathPlanner runs through [m]; other components have none. */
+/** Returns the waypoints of each PathPlanner [m]. */
 function waypointsOf({ parameters }: Run): number[] {
   const planners = Object.keys(parameters).filter((name) => name.endsWith(WAYPOINT));
   return planners.flatMap((first) => {
@@ -203,7 +198,7 @@ function waypointsOf({ parameters }: Run): number[] {
   });
 }
 
-/** What happens in a run: each event that begins, until its end, if it has one. */
+/** Returns the marks of a run: each event from its beginning to its end, if it has one. */
 function marksOf(result: Run | undefined, end: number): Mark[] {
   const happened = result?.happened ?? [];
   return happened.flatMap(({ time, label, event }, k) => {

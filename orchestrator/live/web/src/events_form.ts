@@ -1,12 +1,13 @@
-// Which events happen, when and for how long.
+// The form for events: their set, times and durations.
 
-import { isDuration, isTime } from "./experiment";
+import { make, numberField } from "./dom";
 import { type Edit, eventOf, type Settings } from "./settings";
+import { isDuration, isTime } from "./simulate";
 import { entered } from "./text";
 import type { EventData, Preset } from "./types";
 
-/** What a user does here: take another set of events, or change one of them. */
-export interface Wishes {
+/** Calls for the user's choices: another set of events, or a changed event. */
+interface Wishes {
   take(events: string): void;
   edit(number: number, edit: Edit): void;
 }
@@ -46,7 +47,7 @@ export class EventsForm {
       const isAt = input.dataset.kind === "at";
       const own = isAt ? at : lasts;
       const now = isAt ? (edit.at ?? at) : edit.lasts === undefined ? lasts : edit.lasts;
-      // What cannot be read stays, so that it can be mended.
+      // An invalid number stays in the field, so that the user can correct it.
       const isKept = document.activeElement === input || Number.isNaN(now);
       if (!isKept) input.value = now == null ? "" : String(now);
       const isGood = now == null || (isAt ? isTime(now) : isDuration(now));
@@ -57,29 +58,19 @@ export class EventsForm {
 
   #row(event: EventData): HTMLElement {
     const { number } = event;
-    const item = document.createElement("li");
-    const name = document.createElement("span");
-    name.className = "label";
-    name.textContent = event.label;
+    const name = make("span", "label", event.label);
     name.title = event.text;
-    item.append(name);
-    if (event.at === undefined) {
-      const when = document.createElement("small");
-      when.textContent = `when ${event.when?.signal} ${event.when?.comparison} ${event.when?.value}`;
-      item.append(when);
-    } else {
-      item.append(this.#field("at", number, event.label));
-    }
-    if (event.canEnd) item.append(this.#field("for", number, event.label));
-    return item;
+    const { signal, comparison, value } = event.when ?? {};
+    const when =
+      event.at === undefined
+        ? make("small", "", `when ${signal} ${comparison} ${value}`)
+        : this.#field("at", number, event.label);
+    const duration = event.canEnd ? [this.#field("for", number, event.label)] : [];
+    return make("li", "", name, when, ...duration);
   }
 
   #field(kind: "at" | "for", number: number, label: string): HTMLElement {
-    const whole = document.createElement("label");
-    whole.className = "time";
-    const input = document.createElement("input");
-    input.type = "text";
-    input.inputMode = "decimal";
+    const input = numberField();
     input.dataset.kind = kind;
     input.dataset.number = String(number);
     input.setAttribute("aria-label", kind === "at" ? `${label}: time` : `${label}: duration`);
@@ -92,7 +83,6 @@ export class EventsForm {
       const lasts = input.value.trim() === "" ? null : value;
       this.#wishes.edit(number, kind === "at" ? { at: value } : { lasts });
     });
-    whole.append(`${kind} `, input, " s");
-    return whole;
+    return make("label", "time", `${kind} `, input, " s");
   }
 }

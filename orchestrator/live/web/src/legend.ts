@@ -1,24 +1,23 @@
-// The controllers: a switch for each, and what the colours mean.
+// The controllers: a switch for each, and a legend of the colours.
 
+import { make } from "./dom";
 import type { Comparison, ShownLoop } from "./types";
 
-/** A sample of a line. */
-export function swatch(kind: string): string {
-  return `<span class="swatch of-${kind}"></span>`;
+/** Makes a sample of a line. */
+export function swatch(kind: string): HTMLElement {
+  return make("span", `swatch of-${kind}`);
 }
 
-/** A sample of each vehicle's lines, with its name; of a single vehicle, nothing. */
+/** Makes a sample of each vehicle's lines, with its name; of a single vehicle, nothing. */
 function vehicles({ loops, colours }: Comparison): HTMLElement[] {
   return colours.map((colour, k) => {
-    const item = document.createElement("li");
-    item.innerHTML = swatch("vehicle");
-    (item.firstChild as HTMLElement).style.setProperty("--vehicle", colour);
-    item.append(loops[0].vehicles[k].name);
-    return item;
+    const sample = swatch("vehicle");
+    sample.style.setProperty("--vehicle", colour);
+    return make("li", "", sample, loops[0].vehicles[k].name);
   });
 }
 
-/** A switch for each controller; `changed` gets the labels of those that are hidden. */
+/** Makes a switch for each controller; `changed` gets the labels of hidden ones. */
 export function buildSwitches(
   host: HTMLElement,
   loops: readonly ShownLoop[],
@@ -26,7 +25,6 @@ export function buildSwitches(
   changed: (hidden: readonly string[]) => void,
 ): void {
   const labels = loops.map(({ label }, place) => {
-    const whole = document.createElement("label");
     const box = document.createElement("input");
     box.type = "checkbox";
     box.value = label;
@@ -35,20 +33,16 @@ export function buildSwitches(
       const boxes = [...host.querySelectorAll("input")];
       changed(boxes.filter(({ checked }) => !checked).map(({ value }) => value));
     });
-    const words = document.createElement("span");
-    words.innerHTML = swatch(String(place));
-    words.append(label);
-    whole.append(box, words);
-    return whole;
+    return make("label", "", box, make("span", "", swatch(String(place)), label));
   });
   const legend = host.querySelector("legend");
   host.replaceChildren(...(legend ? [legend] : []), ...labels);
 }
 
 /**
- * What the colours mean: of the vehicles, of the controllers, and of `others`, such as `reference`.
+ * Makes the legend of vehicles, controllers, and `others`, such as `reference`.
  *
- * Where each vehicle has its colour, a controller has only its style of line.
+ * If each vehicle has its own colour, controllers differ only in the style of their lines.
  */
 export function fillLegend(
   host: HTMLElement,
@@ -56,17 +50,11 @@ export function fillLegend(
   loops: readonly ShownLoop[],
   others: readonly string[],
 ): void {
-  const [first] = comparison.colours;
-  const style = first === undefined ? "" : " of-all";
+  const style = comparison.colours.length === 0 ? "" : " of-all";
   const items = loops.map(({ label }, place) => [`${place}${style}`, label]);
   items.push(...others.map((name) => [name, name]));
   host.replaceChildren(
     ...vehicles(comparison),
-    ...items.map(([kind, label]) => {
-      const item = document.createElement("li");
-      item.innerHTML = swatch(kind);
-      item.append(label);
-      return item;
-    }),
+    ...items.map(([kind, label]) => make("li", "", swatch(kind), label)),
   );
 }

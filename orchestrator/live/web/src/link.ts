@@ -1,6 +1,4 @@
-// Settings in the address of the page: after `#`, the preset and what differs from it.
-
-import { isDuration, isTime } from "./experiment";
+// Settings in the address of the page: the preset and its changes, after `#`.
 import {
   type Edit,
   eventOf,
@@ -12,6 +10,7 @@ import {
   withEdit,
   withValues,
 } from "./settings";
+import { isDuration, isTime } from "./simulate";
 import { numberOf } from "./text";
 import type { Data, EventData, Parameter, Value } from "./types";
 
@@ -22,10 +21,10 @@ const EVENTS = "events";
 const HIDDEN = "hide";
 const VEHICLE = "vehicle";
 
-/** What stands in a link for a duration without an end. */
+/** Value of an unlimited duration in a link. */
 const FOR_GOOD = "always";
 
-/** An edited time of an event: `events.1.at`, counted from 1. */
+/** Name of an edited time or duration of an event: `events.1.at`, counted from 1. */
 const EDIT = /^events\.([1-9]\d*)\.(at|for)$/;
 
 export function toHash(settings: Settings, data: Data): string {
@@ -43,12 +42,12 @@ export function toHash(settings: Settings, data: Data): string {
   }
   for (const label of settings.hidden) fields.push([HIDDEN, label]);
   if (settings.vehicle !== fleetOf(preset)[0]) fields.push([VEHICLE, settings.vehicle]);
-  // What was typed and is no number is not sent.
+  // Invalid numbers in fields are left out.
   const sent = fields.filter(([, value]) => value !== "NaN");
   return `#${sent.map(([key, value]) => `${encode(key)}=${encode(value)}`).join("&")}`;
 }
 
-/** Settings of a link, and what of it is not understood. */
+/** Reads settings from a link; also returns the fields that are not understood. */
 export function fromHash(hash: string, data: Data): { settings: Settings; unknown: string[] } {
   const fields = [...new URLSearchParams(hash.replace(/^#/, ""))];
   const presets = fields.filter(([key]) => key === PRESET).map(([, name]) => name);
@@ -82,7 +81,7 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
   const none = { values: {}, edits: {} };
   let settings: Settings = { preset: name, ...none, stopTime, step, events, hidden, vehicle };
   settings = withValues(settings, preset, values);
-  // Which events there are is known only now.
+  // The set of events is known only after all fields were read.
   for (const [key, text] of edited) {
     const [, counted, kind] = EDIT.exec(key) ?? [];
     const number = Number(counted) - 1;
@@ -94,7 +93,7 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
   return { settings, unknown };
 }
 
-/** A change of an event's time or duration; undefined: a scenario file could not have it. */
+/** Reads a change of an event's time or duration; undefined: it is not valid in a scenario file. */
 function editOf(event: EventData, kind: string, text: string): Edit | undefined {
   const time = numberOf(text);
   if (kind === "at") return isTime(time) && event.at !== undefined ? { at: time } : undefined;
@@ -103,7 +102,7 @@ function editOf(event: EventData, kind: string, text: string): Edit | undefined 
   return isDuration(time) ? { lasts: time } : undefined;
 }
 
-/** A text in the type of a parameter; undefined: it is not of this type. */
+/** Reads a text in the type of a parameter; undefined: it is not of this type. */
 export function parsed(parameter: Parameter, text: string): Value | undefined {
   if (parameter.choices) return Object.hasOwn(parameter.choices, text) ? text : undefined;
   if (parameter.type === "Boolean") {
@@ -113,7 +112,7 @@ export function parsed(parameter: Parameter, text: string): Value | undefined {
   return Number.isFinite(number) ? number : undefined;
 }
 
-/** Brackets and dots stay as they are, so that people can read a link. */
+/** Encodes a text for a link; brackets and dots stay readable. */
 function encode(text: string): string {
   return encodeURIComponent(text).replaceAll("%5B", "[").replaceAll("%5D", "]");
 }

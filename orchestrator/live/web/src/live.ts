@@ -1,9 +1,10 @@
-// The live page: it reads what Python has put into it, runs the preset that is opened, and draws it.
+// The live page: reads its data, runs the opened preset, and draws it.
 
-import { type Api, Engine, makeApi } from "./engine";
+import { type Api, makeApi } from "./api";
+import { sayFailure, unpacked } from "./dom";
 import { Page } from "./page";
+import { Engine } from "./simulate";
 import type { Data } from "./types";
-import { sayFailure, unpacked } from "./unpacking";
 
 async function start(): Promise<Api> {
   const [[data], modules] = await Promise.all([unpacked("data"), unpacked("binary")]);

@@ -1,14 +1,13 @@
-// The page: what is set, the runs that follow from it, and what shows them.
+// The live page: its settings, the runs with these, and their display.
 
 import { commandLine } from "./command";
 import { Controls } from "./controls";
-import { Display, element } from "./display";
-import { type Engine, Refusal } from "./engine";
+import { Display } from "./display";
+import { element, make } from "./dom";
 import { EventsForm } from "./events_form";
 import { buildSwitches } from "./legend";
 import { fromHash, toHash } from "./link";
 import {
-  type Changes,
   eventsOf,
   fleetOf,
   presetOf,
@@ -17,23 +16,18 @@ import {
   withEdit,
   withValues,
 } from "./settings";
+import { type Engine, Refusal } from "./simulate";
 import { csvLines, entered } from "./text";
 import type { Data, LoopData, Preset, Result } from "./types";
 
-/** The link is written so long after the last change [ms]: browsers limit how often it may be. */
+/** Delay of a new link after the last change [ms], as browsers limit the rate of changes. */
 const LINK_AFTER = 300;
 
-/** How long a notice stays [ms]. */
-const SAID = 4000;
+/** Duration of a notice [ms]. */
+const NOTICE = 4000;
 
-/** How many parts of a link are listed. */
+/** Most unknown parts of a link in a notice. */
 const NAMED = 5;
-
-function code(text: string): HTMLElement {
-  const made = document.createElement("code");
-  made.textContent = text;
-  return made;
-}
 
 export class Page {
   readonly #data: Data;
@@ -43,21 +37,21 @@ export class Page {
   readonly #events: EventsForm;
   #settings: Settings;
   #preset: Preset;
-  /** The preset that the controls and charts were made for. */
+  /** Preset of the present controls and charts. */
   #built: Preset | undefined;
-  /** The vehicle that the sliders are of. */
+  /** Vehicle of the present sliders. */
   #vehicle = "";
-  /** The preset's loops; their order gives them their colours. */
+  /** Loops of the preset, in the order of their colours. */
   #loops: readonly LoopData[] = [];
-  /** The last runs that could be made, in the order of the loops. */
+  /** Last successful runs, in the order of the loops. */
   #results: (Result | undefined)[] = [];
-  /** The results before them, which nothing shows. */
+  /** Results before these, which are no longer shown. */
   #spare: readonly (Result | undefined)[] = [];
-  /** Why what is set cannot be run; empty: it has been run. */
+  /** Why the settings are refused; empty: they were run. */
   #refusal = "";
   #asked = false;
   #link: ReturnType<typeof setTimeout> | undefined;
-  #said: ReturnType<typeof setTimeout> | undefined;
+  #notice: ReturnType<typeof setTimeout> | undefined;
 
   constructor(data: Data, engine: Engine) {
     this.#data = data;
@@ -67,7 +61,7 @@ export class Page {
     this.#preset = presetOf(data, settings.preset) ?? data.presets[0];
     this.#display = new Display(data);
     this.#controls = new Controls(element("groups"), element("all"), element("search"), (values) =>
-      this.set(values),
+      this.#take(withValues(this.#settings, this.#preset, values)),
     );
     this.#events = new EventsForm(element("events"), element("event-list"), {
       take: (events) => this.#take({ ...this.#settings, events, edits: {} }),
@@ -83,7 +77,10 @@ export class Page {
     select.append(
       ...this.#data.presets.map(({ name, title }) => new Option(`${name}: ${title}`, name)),
     );
-    select.addEventListener("change", () => this.open(select.value));
+    select.addEventListener("change", () => {
+      const preset = presetOf(this.#data, select.value);
+      if (preset) this.apply(untouched(preset));
+    });
     const vehicle = element<HTMLSelectElement>("vehicle");
     vehicle.addEventListener("change", () =>
       this.apply({ ...this.#settings, vehicle: vehicle.value }),
@@ -120,21 +117,7 @@ export class Page {
     });
   }
 
-  /** Opens a preset as it is. */
-  open(name: string): void {
-    const preset = presetOf(this.#data, name);
-    if (!preset) return;
-    this.#settings = untouched(preset);
-    this.#open();
-    this.#linkLater();
-  }
-
-  /** Sets parameters by `component.parameter`, and runs. */
-  set(values: Changes): void {
-    this.#take(withValues(this.#settings, this.#preset, values));
-  }
-
-  /** Takes settings as a whole, and runs. */
+  /** Replaces all settings, and runs. */
   apply(settings: Settings): void {
     this.#settings = settings;
     this.#open();
@@ -145,15 +128,15 @@ export class Page {
     return this.#settings;
   }
 
-  /** Makes what belongs to a preset, and runs it. */
+  /** Makes the elements for a preset, and runs it. */
   #open(): void {
     this.#preset = presetOf(this.#data, this.#settings.preset) ?? this.#data.presets[0];
     this.#loops = this.#preset.drawn.map((place) => this.#preset.loops[place]);
     document.title = this.#preset.title;
     element<HTMLSelectElement>("preset").value = this.#preset.name;
-    // Names of parameters stand between backquotes.
+    // Backquotes enclose the names of parameters.
     element("remark").replaceChildren(
-      ...this.#preset.remark.split("`").map((text, k) => (k % 2 ? code(text) : text)),
+      ...this.#preset.remark.split("`").map((text, k) => (k % 2 ? make("code", "", text) : text)),
     );
     buildSwitches(element("loops"), this.#loops, this.#settings.hidden, (hidden) =>
       this.#take({ ...this.#settings, hidden }),
@@ -164,12 +147,12 @@ export class Page {
     }
     this.#openVehicle();
     this.#built = this.#preset;
-    this.run();
+    this.#run();
     const { player } = this.#display;
     player.seek(player.time);
   }
 
-  /** Makes the controls of the vehicle that is chosen. */
+  /** Makes the controls of the chosen vehicle. */
   #openVehicle(): void {
     const preset = this.#preset;
     const { vehicle } = this.#settings;
@@ -181,7 +164,7 @@ export class Page {
     element<HTMLSelectElement>("vehicle").value = vehicle;
   }
 
-  /** The place of the chosen vehicle among all. */
+  /** Number of the chosen vehicle. */
   get #chosen(): number {
     return Math.max(0, fleetOf(this.#preset).indexOf(this.#settings.vehicle));
   }
@@ -190,15 +173,15 @@ export class Page {
     this.#settings = settings;
     this.#linkLater();
     if (this.#asked) return;
-    // However many moves of a slider there are, there is one run for each picture of the screen.
+    // One run per frame, even if a slider moves several times.
     this.#asked = true;
     requestAnimationFrame(() => {
-      if (this.#asked) this.run();
+      if (this.#asked) this.#run();
     });
   }
 
-  /** Runs what is set, and shows it. */
-  run(): void {
+  /** Runs the settings, and shows the results. */
+  #run(): void {
     this.#asked = false;
     this.#showSettings();
     try {
@@ -210,7 +193,7 @@ export class Page {
       if (!(error instanceof Refusal)) throw error;
       this.#refusal = error.message;
       this.#refuse(error.message);
-      // The last good runs stay; a link may have none.
+      // The last successful runs stay; after a link, there may be none.
       if (this.#results.length > 0) return;
       const { hidden, vehicle } = this.#settings;
       this.#results = this.#runs({ ...untouched(this.#preset), hidden, vehicle });
@@ -232,14 +215,14 @@ export class Page {
     });
   }
 
-  /** What there is to say of the results, each with the name of its controller. */
-  #each(said: (result: Result) => readonly string[]): string[] {
+  /** Returns texts about the results, each with the name of its controller. */
+  #each(texts: (result: Result) => readonly string[]): string[] {
     return this.#results.flatMap((result, k) =>
-      result ? said(result).map((text) => `${this.#loops[k].label}: ${text}`) : [],
+      result ? texts(result).map((text) => `${this.#loops[k].label}: ${text}`) : [],
     );
   }
 
-  /** Says why what is set cannot be run to its end, and what else there is to say of its runs. */
+  /** Shows why the settings cannot be run to the end, and other messages of the runs. */
   #refuse(message: string, messages = ""): void {
     const isSeen = this.#controls.refuse(message);
     for (const [id, text] of [
@@ -248,7 +231,7 @@ export class Page {
     ]) {
       const place = element(id);
       place.hidden = text === "";
-      // Readers of the screen say it again whenever it is set.
+      // Screen readers repeat a text whenever it is set.
       if (place.textContent !== text) place.textContent = text;
     }
     document.body.classList.toggle("refused", message !== "");
@@ -276,7 +259,7 @@ export class Page {
     const own = toHash({ ...untouched(preset), hidden, vehicle }, this.#data);
     const isTouched = toHash(this.#settings, this.#data) !== own;
     element("reset-all").hidden = !isTouched;
-    // The remark gives numbers of the preset's own run.
+    // The remark has numbers of the preset without changes.
     element("remark-head").hidden = !isTouched;
     element("remark").classList.toggle("outdated", isTouched);
   }
@@ -295,28 +278,25 @@ export class Page {
     history.replaceState(null, "", toHash(this.#settings, this.#data));
   }
 
-  /** The loop that is copied and downloaded: the scenario's own, if it is shown. */
-  #meant(): LoopData {
+  /** Returns the loop to copy and download: the scenario's own, if it is shown. */
+  #exported(): LoopData {
     const { loops } = this.#preset;
     return loops.find(({ label }) => !this.#settings.hidden.includes(label)) ?? loops[0];
   }
 
-  /** The command that makes the rows of the CSV. */
-  command(): string {
-    return commandLine(this.#settings, this.#preset, this.#meant());
-  }
-
-  /** The result of the loop that is meant, by what is set; if there is none, a notice says why. */
+  /** Returns the result of the loop to export; if there is none, a notice shows why. */
   #result(): Result | undefined {
-    if (this.#asked) this.run();
-    const result = this.#results[this.#loops.indexOf(this.#meant())];
+    if (this.#asked) this.#run();
+    const result = this.#results[this.#loops.indexOf(this.#exported())];
     if (this.#refusal) this.#say(`Not run: ${this.#refusal}`);
     else if (!result) this.#say("Show a controller first");
     return this.#refusal ? undefined : result;
   }
 
   #copyCommand(): void {
-    if (this.#result()) this.#copy(this.command(), "Command copied");
+    if (!this.#result()) return;
+    const command = commandLine(this.#settings, this.#preset, this.#exported());
+    this.#copy(command, "Command copied");
   }
 
   #download(): void {
@@ -335,7 +315,7 @@ export class Page {
       await navigator.clipboard.writeText(text);
       this.#say(done);
     } catch {
-      // A page from a disk may be refused the clipboard, and may still copy a selection.
+      // Browsers may deny the clipboard to a page from a disk, and still let it copy a selection.
       const area = document.createElement("textarea");
       area.value = text;
       document.body.append(area);
@@ -352,11 +332,11 @@ export class Page {
   }
 
   #say(text: string): void {
-    const said = element("said");
-    said.textContent = text;
-    clearTimeout(this.#said);
-    this.#said = setTimeout(() => {
-      said.textContent = "";
-    }, SAID);
+    const notice = element("said");
+    notice.textContent = text;
+    clearTimeout(this.#notice);
+    this.#notice = setTimeout(() => {
+      notice.textContent = "";
+    }, NOTICE);
   }
 }

@@ -1,10 +1,10 @@
-// What the charts show of a run.
+// The sections and lines of the charts.
 
-import { commandName, inSteps, limits, smallestDistance, trackingError } from "./engine";
+import { commandName, inSteps, limits, smallestDistance, trackingError } from "./signals";
 import { escaped } from "./text";
 import type { Common, Run, Units, VehicleData } from "./types";
 
-/** Colour and style of a line: of a controller, of what is true or wanted, or of all vehicles. */
+/** Colour and style of a line: of a controller, a true or wanted value, or all vehicles. */
 export type Style = "first" | "second" | "reference" | "first-of-all" | "second-of-all";
 
 export interface Panel {
@@ -12,27 +12,27 @@ export interface Panel {
   readonly title: string;
   readonly unit: string;
   readonly styles: readonly Style[];
-  /** Names of the lines, for readers of the screen and for the legend. */
+  /** Names of the lines, for screen readers and for the legend. */
   readonly names: readonly string[];
 }
 
 export interface Section {
   readonly title: string;
   readonly note: string;
-  /** Whether the heading names the lines: they are not the controllers'. */
+  /** If set, the heading names the lines, which are not the controllers'. */
   readonly named?: boolean;
   readonly panels: readonly Panel[];
 }
 
-/** The values of a panel's lines, with the times of their rows. */
+/** Values of a panel's lines, with the times of their rows. */
 export interface Lines {
   readonly time: Float64Array;
   readonly values: readonly (Float64Array | undefined)[];
-  /** The limits of a command, if there are any. */
+  /** Limits of a command, if it has any. */
   readonly limits?: readonly [number, number];
 }
 
-/** The sections of a page whose controllers have these names, for one vehicle or several. */
+/** Returns the sections for controllers with these names, for one vehicle or several. */
 export function sections(
   labels: readonly string[],
   units: Common["units"],
@@ -91,7 +91,7 @@ export function sections(
   ];
 }
 
-/** The result with the most rows: a run that failed is shorter than the other. */
+/** Returns the result with the most rows: a failed run is shorter than the other. */
 export function longest(results: readonly (Run | undefined)[]): Run | undefined {
   return results.reduce(
     (best, one) => (one && one.rows > (best?.rows ?? 0) ? one : best),
@@ -99,18 +99,18 @@ export function longest(results: readonly (Run | undefined)[]): Run | undefined 
   );
 }
 
-/** The vehicles of a loop, and the one of them that is looked at. */
-export interface Chosen {
+/** The vehicles of a loop, and the chosen one. */
+interface Chosen {
   readonly vehicle: VehicleData;
   readonly fleet: readonly VehicleData[];
 }
 
 /**
- * The lines of all panels, section by section.
+ * Returns the lines of all panels, section by section.
  *
- * @param results of the loops.
- * @param chosen of each of them.
- * @param units of the groups of signals.
+ * @param results runs of the loops.
+ * @param chosen vehicles of each loop.
+ * @param units printed units of the groups of signals.
  */
 export function lines(
   results: readonly (Run | undefined)[],
@@ -122,9 +122,9 @@ export function lines(
   const rows = Math.max(0, (whole?.rows ?? 0) - 1);
   /** Times at which steps begin. */
   const starts = time.subarray(0, rows);
-  const of = <T>(make: (result: Run, chosen: Chosen) => T): (T | undefined)[] =>
+  const ofEach = <T>(make: (result: Run, chosen: Chosen) => T): (T | undefined)[] =>
     results.map((result, place) => result && make(result, chosen[place]));
-  const errors = of((result, { vehicle }) => trackingError(result, vehicle));
+  const errors = ofEach((result, { vehicle }) => trackingError(result, vehicle));
   const steps = (result: Run | undefined, name: string) =>
     result?.has(name) ? inSteps(result, name) : undefined;
   const observed = results.findIndex((result, place) =>
@@ -135,7 +135,7 @@ export function lines(
   return [
     Object.keys(units.e).map((_, k) => ({ time, values: errors.map((error) => error?.[k]) })),
     Object.keys(units.tau).map((member) => {
-      const values = of((result, { vehicle }) =>
+      const values = ofEach((result, { vehicle }) =>
         steps(result, commandName(result, vehicle, member)),
       );
       const ends = whole && limits(whole, chosen[results.indexOf(whole)].vehicle, member);
@@ -150,13 +150,15 @@ export function lines(
     })),
     Object.keys(units.theta_hat).map((k) => ({
       time: starts,
-      values: of((result, { vehicle }) => steps(result, `${vehicle.controller}.theta_hat[${k}]`)),
+      values: ofEach((result, { vehicle }) =>
+        steps(result, `${vehicle.controller}.theta_hat[${k}]`),
+      ),
     })),
-    [{ time, values: of((result, { fleet }) => smallestDistance(result, fleet)) }],
+    [{ time, values: ofEach((result, { fleet }) => smallestDistance(result, fleet)) }],
   ];
 }
 
-/** Sections of runs without vehicles: for each group of columns, with a chart for each column. */
+/** Returns a section for each group of columns, for runs without vehicles. */
 export function columnSections(labels: readonly string[], columns: Units): readonly Section[] {
   const styles = (["first", "second"] as const).slice(0, labels.length);
   return groupsOf(columns).map(([title, names]) => ({
@@ -171,7 +173,7 @@ export function columnSections(labels: readonly string[], columns: Units): reado
   }));
 }
 
-/** The lines of these charts. */
+/** Returns the lines of these charts. */
 export function columnLines(
   results: readonly (Run | undefined)[],
   columns: Units,
@@ -183,7 +185,7 @@ export function columnLines(
   );
 }
 
-/** Columns by what their names begin with: `plant.eta` of `plant.eta.x`, `plant.u` of `plant.u[1]`. */
+/** Groups columns by prefix: `plant.eta` of `plant.eta.x`, `plant.u` of `plant.u[1]`. */
 function groupsOf(columns: Units): [string, string[]][] {
   const groups = new Map<string, string[]>();
   for (const name of Object.keys(columns)) {
@@ -197,7 +199,7 @@ function known(result: Run | undefined, name: string): Float64Array | undefined 
   return result?.has(name) ? result.column(name) : undefined;
 }
 
-/** Columns beside each other: as many numbers for each row. */
+/** Returns columns row by row, a number of each column. */
 export function interleaved(columns: readonly Float64Array[]): Float64Array {
   const width = columns.length;
   const values = new Float64Array(width * columns[0].length);

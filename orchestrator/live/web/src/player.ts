@@ -1,10 +1,10 @@
-// Plays a run: one time for the scene and all charts.
+// The player: the current time of the scene and of all charts.
 
 import type { Mark } from "./charts";
 import { general } from "./text";
 
 /** Elements of the bar below the scene. */
-export interface Bar {
+interface Bar {
   toggle: HTMLButtonElement;
   slider: HTMLInputElement;
   output: HTMLOutputElement;
@@ -12,10 +12,10 @@ export interface Bar {
   marks: HTMLElement;
 }
 
-/** A run is played within about as many seconds, if one of the speeds allows it. */
+/** Seconds in which a run is played, if one of the speeds allows it. */
 const PATIENCE = 25;
 
-/** The slider has at least so many positions, and ten or more in a second. */
+/** Least number of positions of the slider, which also has at least ten per second. */
 const POSITIONS = 100;
 
 export class Player {
@@ -46,7 +46,7 @@ export class Player {
     return this.#time;
   }
 
-  /** Positions of the slider in a second, a power of ten. */
+  /** Positions of the slider per second, a power of ten. */
   get #fine(): number {
     return 10 ** Math.max(1, Math.ceil(Math.log10(POSITIONS / (this.#end - this.#start || 1))));
   }
@@ -55,11 +55,11 @@ export class Player {
     return this.#started !== undefined;
   }
 
-  /** Another run: its start and end [s], and what happens in it. */
+  /** Sets the start and end of a run [s], and its events. */
   set(start: number, end: number, marks: readonly Mark[]): void {
     const isOther = start !== this.#start || end !== this.#end;
     const length = end - start;
-    // At rest a run is shown as a whole.
+    // A player that rests at the end of a run rests at the end of the next.
     const isAtEnd = this.#time >= this.#end && !this.isPlaying;
     this.#start = start;
     this.#end = end;
@@ -82,14 +82,14 @@ export class Player {
     if (isAtEnd || this.#time > end) this.#time = end;
     this.#time = Math.max(start, this.#time);
     this.#restart();
-    this.#tell();
+    this.#update();
   }
 
-  /** Goes to a time; what plays goes on from there. */
+  /** Moves to a time, and keeps playing from there. */
   seek(time: number): void {
     this.#time = Math.min(this.#end, Math.max(this.#start, time));
     this.#restart();
-    this.#tell();
+    this.#update();
   }
 
   toggle(): void {
@@ -113,12 +113,12 @@ export class Player {
     if (!this.#started) return;
     const passed = Math.max(0, now - this.#started.now) / 1000;
     this.#time = Math.min(this.#end, this.#started.time + Number(this.#bar.speed.value) * passed);
-    this.#tell();
+    this.#update();
     if (this.#time >= this.#end) this.toggle();
     else this.#frame = requestAnimationFrame((next) => this.#tick(next));
   }
 
-  #tell(): void {
+  #update(): void {
     const fine = this.#fine;
     const time = this.#time.toFixed(Math.log10(fine));
     this.#bar.slider.value = String(Math.round(this.#time * fine));

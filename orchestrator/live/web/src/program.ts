@@ -1,4 +1,4 @@
-// A program in a module: its memory, its functions, and what it has refused.
+// Programs in a WebAssembly module: memory, calls and refusals.
 
 import type { Metrics } from "./types";
 
@@ -7,24 +7,24 @@ export const REAL = 8;
 /** Bytes of a page of memory. */
 const PAGE = 65536;
 
-/** What has been refused: a component, one of `CALLS`, and an input or parameter, by their numbers. */
+/** A refusal: numbers of the component and of the input or parameter, and the call. */
 export interface Refused {
   readonly component: number;
   readonly call: Call;
   readonly port: number;
-  /** After how many steps. */
+  /** Number of steps before. */
   readonly made: number;
 }
 
-/** What a component may refuse, in the order of their numbers. */
+/** Calls that a component may refuse, in the order of their numbers. */
 const CALLS = ["start", "input", "outputs", "step", "set"] as const;
-export type Call = (typeof CALLS)[number];
+type Call = (typeof CALLS)[number];
 
-/** What a run comes to, in the order of their numbers. */
+/** Outcomes of a run, in the order of their numbers. */
 const OUTCOMES = ["whole", "refused", "ended"] as const;
-export type Outcome = (typeof OUTCOMES)[number];
+type Outcome = (typeof OUTCOMES)[number];
 
-/** Numbers of a run's experiment. */
+/** Steps and times of a run. */
 export interface Times {
   readonly step: number;
   readonly stopTime: number;
@@ -32,38 +32,39 @@ export interface Times {
   readonly steps: number;
 }
 
-/** What is to happen, as events.c has it. */
+/** Events of a run, in the form of events.c. */
 export interface Agenda {
   readonly n: number;
   readonly events: Float64Array;
   readonly actions: Float64Array;
-  /** How many numbers say what has happened. */
+  /** Numbers in the list of occurrences. */
   readonly listed: number;
 }
 
-/** What makes indices of the rows of a run. */
+/** A reducer, which makes indices from the rows of a run. */
 export interface Reducer {
   readonly name: string;
-  /** Where in a row each number is that it takes; -1: it is a constant. */
+  /** Place of each argument in a row; -1: a constant. */
   readonly from: readonly number[];
   readonly constants: readonly number[];
-  /** In which row what acts in a step stands: 0, that of its beginning, or 1, that of its end. */
+  /** Row with the values that act in a step: 0: at its beginning, 1: at its end. */
   readonly actingRow: number;
-  /** The index that each number is a member of, by its name. */
+  /** Name of the index of each result. */
   readonly gives: readonly string[];
 }
 
-/** What a run has left. */
+/** Results of a run. */
 export interface Run {
   readonly outcome: Outcome;
-  /** Why there is no row, or none after the last. */
+  /** Refusal, if there is one. */
   readonly refused: Refused;
-  /** How many rows there are. */
+  /** Number of rows. */
   readonly rows: number;
-  /** Rows and what has happened, in the memory: the next run overwrites them. */
+  /** Rows, in memory that the next run overwrites. */
   readonly table: Float64Array;
+  /** Occurrences, in memory that the next run overwrites. */
   readonly happened: Float64Array;
-  /** When the guards of components first started their states over; less than 0: none did. */
+  /** Times at which guards of components first reset their states; less than 0: never. */
   readonly restarts: Float64Array;
   /** Indices of each vehicle. */
   readonly metrics: readonly Metrics[];
@@ -71,7 +72,7 @@ export interface Run {
 
 type Function = (...args: number[]) => number;
 
-/** A module with several programs, of which one at a time uses its memory. */
+/** A module with several programs, which use its memory one at a time. */
 export class Module {
   private constructor(private readonly exports: WebAssembly.Exports) {}
 
@@ -81,7 +82,7 @@ export class Module {
     return new Module(instance.exports);
   }
 
-  /** A run of a program: so many numbers make a row. */
+  /** Runs a program whose rows have a given width. */
   run(
     number: number,
     values: Float64Array,
@@ -140,12 +141,12 @@ export class Module {
     return this.exports.memory as WebAssembly.Memory;
   }
 
-  /** Views are lost when the memory grows. */
+  /** Returns a view of the memory, valid until the memory grows. */
   private doubles(address: number, n: number): Float64Array {
     return new Float64Array(this.memory.buffer, address, n);
   }
 
-  /** Addresses for so many doubles each, where nothing else is. */
+  /** Returns addresses of free memory for given numbers of doubles. */
   private lay(sizes: readonly number[]): number[] {
     let end = (this.exports.__heap_base as WebAssembly.Global).value as number;
     end = Math.ceil(end / REAL) * REAL;
@@ -159,7 +160,7 @@ export class Module {
   }
 }
 
-/** The members of each index that is there. */
+/** Groups results by index, without indices that are missing. */
 function named(members: readonly (readonly [string, number])[]): Metrics {
   const found: Record<string, number[]> = {};
   for (const [index, value] of members) found[index] = [...(found[index] ?? []), value];

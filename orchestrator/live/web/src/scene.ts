@@ -1,63 +1,65 @@
-// The path in space, with the vehicles on it at their attitudes.
+// The scene: paths in space, with the vehicles on them at their attitudes.
 
 import { Camera, type Mesh, Renderer, Transform } from "ogl";
-import { axesOf, grid, type Label } from "./axes";
-import { PathLine, POINTS, Primitives } from "./lines";
+import { make } from "./dom";
+import { PathLine, POINTS, Primitives, paintVehicle, vehicleMesh } from "./meshes";
 import {
+  axesOf,
   type Box,
   boxOf,
   distanceFor,
   drawn,
   extents,
   eyeAxes,
+  grid,
+  type Label,
   rotation,
   type Vector,
 } from "./space";
 import { mixed, type Palette, vehicleColour } from "./theme";
 import { Turning } from "./turning";
 import type { Hull } from "./types";
-import { paintVehicle, vehicleMesh } from "./vehicle_mesh";
 
-/** Of a vehicle in a run: three numbers for each row. */
+/** Path and attitudes of a vehicle in a run: three numbers for each row. */
 export interface Track {
-  /** The control point [m], earth frame. */
+  /** Control point [m], earth frame. */
   path: Float64Array;
   /** Roll, pitch and yaw [rad]. */
   attitude: Float64Array;
 }
 
-/** What a scene shows. */
-export interface Shown {
-  /** Of each controller, in their order, the tracks of all vehicles; none: it is hidden. */
+/** Content of a scene. */
+interface Shown {
+  /** Tracks of all vehicles, by controller; empty: the controller is hidden. */
   tracks: readonly (readonly Track[])[];
-  /** Of each vehicle, as far as there are any. */
+  /** References of the vehicles; undefined: no reference. */
   references: readonly (Float64Array | undefined)[];
-  /** A colour for each vehicle; none: each controller has its colour. */
+  /** Colours of the vehicles; empty: each controller has its colour. */
   colours: readonly string[];
-  /** The same for the references. */
+  /** Colours of the references. */
   referenceColours: readonly string[];
-  /** Of the reference: three numbers each [m]. */
+  /** Waypoints of the reference: three numbers each [m]. */
   waypoints: readonly number[];
   /** Distance of the control point from the centre of mass [m]. */
   ell: number;
   zUp: boolean;
 }
 
-/** Half of the angle of view [rad]. */
+/** Half the angle of view [rad]. */
 const HALF = 0.3;
 
-/** Least length of the drawn vehicle: shares of the extents of the paths, and times ell. */
+/** Least length of the drawn vehicle: shares of the two largest extents, and a multiple of ell. */
 const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
 const LENGTH = 2;
 
-/** Of more vehicles not every reference has a mark. */
+/** Most marks of references. */
 const MOST_TARGETS = 1000;
 
-/** Half of the length of the lines of a waypoint's cross: a share of the scene. */
+/** Half the length of the lines of a waypoint's cross, as a share of the scene. */
 const CROSS = 0.015;
 
-/** Half of the width of a title [px]. */
+/** Half the width of a title [px]. */
 const HALF_TITLE = 40;
 
 /** Room for the numbers around the box [px]. */
@@ -66,19 +68,16 @@ const MARGIN = 25;
 /** Numbers along an axis that are closer together than this are left out [px]. */
 const CROWDED = 24;
 
-/** What is said where the path is missing. */
+/** Makes a note in place of a missing scene. */
 export function missing(text: string): HTMLElement {
-  const note = document.createElement("p");
-  note.className = "missing";
-  note.textContent = text;
-  return note;
+  return make("p", "missing", text);
 }
 
-/** How faint a path is after the time that is shown, and how faint a vehicle's reference. */
+/** Shares of the background in a path after the current time, and of grey in a vehicle's reference. */
 const LATER = 0.68;
 const FAINT = 0.35;
 
-/** What a vehicle with a controller is drawn with. */
+/** Path and mesh of a vehicle with a controller. */
 interface Drawing {
   readonly controller: number;
   readonly vehicle: number;
@@ -142,8 +141,7 @@ export class Scene {
       mesh.setParent(this.#root);
     }
     this.#provide([], 1);
-    this.#labels = document.createElement("div");
-    this.#labels.className = "scene-labels";
+    this.#labels = make("div", "scene-labels");
     this.#labels.setAttribute("aria-hidden", "true");
     host.append(this.#labels);
     this.#turning = new Turning(canvas, () => this.draw());
@@ -155,7 +153,7 @@ export class Scene {
     this.#resize();
   }
 
-  /** Makes what a scene with these tracks and so many references lacks. */
+  /** Makes the drawings that these tracks and so many references need. */
   #provide(tracks: Shown["tracks"], references: number): void {
     const gl = this.#renderer.gl;
     while (this.#references.length < references) {
@@ -166,14 +164,12 @@ export class Scene {
     tracks.forEach((vehicles, controller) => {
       for (let vehicle = 0; vehicle < vehicles.length; vehicle++) {
         if (this.#drawing(controller, vehicle)) continue;
-        const made = {
-          path: new PathLine(gl, 2.6, controller > 0),
-          mesh: vehicleMesh(gl, this.#hull),
-        };
-        made.path.mesh.setParent(this.#root);
-        made.mesh.matrixAutoUpdate = false;
-        made.mesh.setParent(this.#root);
-        this.#drawings.push({ controller, vehicle, ...made });
+        const path = new PathLine(gl, 2.6, controller > 0);
+        const mesh = vehicleMesh(gl, this.#hull);
+        path.mesh.setParent(this.#root);
+        mesh.matrixAutoUpdate = false;
+        mesh.setParent(this.#root);
+        this.#drawings.push({ controller, vehicle, path, mesh });
       }
     });
   }
@@ -212,7 +208,7 @@ export class Scene {
     this.draw();
   }
 
-  /** Other runs, or others of them. */
+  /** Shows other runs or vehicles. */
   set(shown: Shown): void {
     this.#shown = shown;
     this.#provide(shown.tracks, shown.references.length);
@@ -246,14 +242,14 @@ export class Scene {
     this.show(this.#row);
   }
 
-  /** The vehicles as they are in a row. */
+  /** Shows the vehicles at a row. */
   show(row: number): void {
     this.#row = Math.max(0, Math.min(row, this.#rows - 1));
     const { tracks, references } = this.#shown;
     for (const { controller, vehicle, path, mesh } of this.#drawings) {
       const track = tracks[controller]?.[vehicle];
       if (!track) continue;
-      // A run that failed has fewer rows.
+      // A failed run has fewer rows.
       const last = track.path.length / 3 - 1;
       path.progress = last > 0 ? this.#row / last : 1;
       this.#pose(mesh, track, Math.min(this.#row, last));
@@ -270,7 +266,7 @@ export class Scene {
   #pose(mesh: Mesh, { path, attitude }: Track, row: number): void {
     const r = rotation(attitude[3 * row], attitude[3 * row + 1], attitude[3 * row + 2]);
     const at = this.#placed(path[3 * row], path[3 * row + 1], path[3 * row + 2]);
-    // With z up, y is to port and z up in the body, too.
+    // With z up, the body frame also has y to port and z up.
     const sign = this.#shown.zUp ? -1 : 1;
     const size = this.#length * this.#scale;
     const columns = [0, 1, 2].map((k) =>
@@ -324,7 +320,7 @@ export class Scene {
     return sampled;
   }
 
-  /** Draws once before the next picture of the screen, however often it is asked for. */
+  /** Draws once before the next frame, even if it is called several times. */
   draw(): void {
     if (this.#asked) return;
     this.#asked = true;

@@ -1,4 +1,4 @@
-// What a user has set: a preset, and what differs from it.
+// Settings of the user: a preset and its changes.
 
 import type {
   Comparison,
@@ -11,13 +11,13 @@ import type {
   Values,
 } from "./types";
 
-/** A changed time or duration of an event; `lasts` null: for good [s]. */
+/** Changed time or duration of an event [s]; `lasts` null: until the run ends. */
 export interface Edit {
   readonly at?: number;
   readonly lasts?: number | null;
 }
 
-/** Values by `component.parameter`; undefined: the preset's own again. */
+/** Values by `component.parameter`; undefined: back to the preset's value. */
 export type Changes = Readonly<Record<string, Value | undefined>>;
 
 export interface Settings {
@@ -28,13 +28,13 @@ export interface Settings {
   readonly stopTime: number;
   /** [s] */
   readonly step: number;
-  /** The scenario whose events happen; `""`: none. */
+  /** Scenario whose events happen; `""`: none. */
   readonly events: string;
-  /** Changes of these events, by their numbers from 0. */
+  /** Changes of these events, by number from 0. */
   readonly edits: Readonly<Record<number, Edit>>;
-  /** Labels of controllers that are not shown. */
+  /** Labels of hidden controllers. */
   readonly hidden: readonly string[];
-  /** The vehicle that charts, indices and sliders are of. */
+  /** Vehicle of the charts, indices and sliders. */
   readonly vehicle: string;
 }
 
@@ -42,12 +42,12 @@ export function presetOf(data: Data, name: string): Preset | undefined {
   return data.presets.find((preset) => preset.name === name);
 }
 
-/** The names of the vehicles of runs that are compared. */
+/** Returns the names of the vehicles in a comparison. */
 export function fleetOf({ loops }: Comparison): readonly string[] {
   return loops[0].vehicles.map(({ name }) => name);
 }
 
-/** A preset as it is. */
+/** Returns the settings of a preset without changes. */
 export function untouched(preset: Preset): Settings {
   const { name, stopTime, step, events } = preset;
   return {
@@ -62,7 +62,7 @@ export function untouched(preset: Preset): Settings {
   };
 }
 
-/** All parameters that a preset's loops have, each once; the first loop's values count. */
+/** Returns the parameters of all loops of a preset, each once with the value of the first loop. */
 export function parametersOf(preset: Preset): ReadonlyMap<string, Parameter> {
   const found = new Map<string, Parameter>();
   for (const loop of preset.loops) {
@@ -73,7 +73,7 @@ export function parametersOf(preset: Preset): ReadonlyMap<string, Parameter> {
   return found;
 }
 
-/** Settings with other values; undefined, and a value that every loop has anyway, is no change. */
+/** Returns settings with changed values; undefined, or the value of all loops, undoes a change. */
 export function withValues(settings: Settings, preset: Preset, changed: Changes): Settings {
   const values: Record<string, Value> = { ...settings.values };
   const all = preset.loops.flatMap(({ parameters }) => parameters);
@@ -85,12 +85,12 @@ export function withValues(settings: Settings, preset: Preset, changed: Changes)
   return { ...settings, values };
 }
 
-/** An event of a scenario by its number, as the preset's own loop has it. */
+/** Returns an event of a scenario by its number, from the preset's own loop. */
 export function eventOf(preset: Preset, events: string, number: number): EventData | undefined {
   return preset.loops[0].events[events]?.find((event) => event.number === number);
 }
 
-/** Settings with a change of an event; the event's own times are no change. */
+/** Returns settings with a change of an event; its own times undo a change. */
 export function withEdit(settings: Settings, preset: Preset, number: number, edit: Edit): Settings {
   const event = eventOf(preset, settings.events, number);
   if (!event) return settings;
@@ -102,7 +102,7 @@ export function withEdit(settings: Settings, preset: Preset, number: number, edi
   return { ...settings, edits };
 }
 
-/** The events of a loop, at the times that are set. */
+/** Returns the events of a loop with their edited times. */
 export function eventsOf(settings: Settings, loop: LoopData): readonly EventData[] {
   const events = loop.events[settings.events] ?? [];
   return events.map((event) => {
@@ -116,7 +116,7 @@ export function eventsOf(settings: Settings, loop: LoopData): readonly EventData
   });
 }
 
-/** Whether the events are other than the preset's. */
+/** Tells whether the events differ from the preset's. */
 export function hasOtherEvents(settings: Settings, preset: Preset): boolean {
   return settings.events !== preset.events || Object.keys(settings.edits).length > 0;
 }

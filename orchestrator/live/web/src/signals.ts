@@ -1,11 +1,11 @@
-// What follows from the rows of a run.
+// Signals that are computed from the rows of a run.
 import type { Metrics, Run, VehicleData } from "./types";
 
 const AXES = ["x", "y", "z"];
 
 type Columns = Float64Array[];
 
-/** What has been made of a run, by the names of the vehicles: the page asks more than once. */
+/** Signals of runs that were computed before, by vehicle. */
 const points = new WeakMap<Run, Map<string, Columns>>();
 const errors = new WeakMap<Run, Map<string, Columns>>();
 const gaps = new WeakMap<Run, Float64Array>();
@@ -22,7 +22,7 @@ function made(
   return found;
 }
 
-/** The control point without noise, a coordinate each [m]: (9) on the vehicle's posture. */
+/** Returns the coordinates of the control point without noise [m]: (9) for the vehicle's posture. */
 export function controlPoint(result: Run, vehicle: VehicleData): Columns {
   return made(points, result, vehicle, () => {
     const name = vehicle.vehicle;
@@ -32,7 +32,7 @@ export function controlPoint(result: Run, vehicle: VehicleData): Columns {
     const ell = Number(result.parameters[`${name}.ell`]);
     const [x, y, z] = AXES.map((axis) => result.column(`${name}.eta.${axis}`).slice());
     for (let k = 0; k < phi.length; k++) {
-      // The first column of the rotation: the direction of the vehicle's nose.
+      // The first column of the rotation is the direction of the nose.
       x[k] += ell * Math.cos(psi[k]) * Math.cos(theta[k]);
       y[k] += ell * Math.sin(psi[k]) * Math.cos(theta[k]);
       z[k] -= ell * Math.sin(theta[k]);
@@ -41,13 +41,13 @@ export function controlPoint(result: Run, vehicle: VehicleData): Columns {
   });
 }
 
-/** The reference y_d, a coordinate each [m]; undefined: the vehicle has none. */
+/** Returns the coordinates of the reference y_d [m]; undefined: there is no reference. */
 export function reference(result: Run, { planner }: VehicleData): Columns | undefined {
   if (!result.has(`${planner}.y_d.x`)) return undefined;
   return AXES.map((axis) => result.column(`${planner}.y_d.${axis}`));
 }
 
-/** e = y - y_d with the true control point [m]; undefined: the vehicle has no reference. */
+/** Returns e = y - y_d with the true control point [m]; undefined: there is no reference. */
 export function trackingError(result: Run, vehicle: VehicleData): Columns | undefined {
   const wanted = reference(result, vehicle);
   if (wanted === undefined) return undefined;
@@ -56,7 +56,7 @@ export function trackingError(result: Run, vehicle: VehicleData): Columns | unde
   );
 }
 
-/** Distance between the two centres of mass that are closest [m]; undefined: there is only one. */
+/** Returns the smallest distance of two centres of mass [m]; undefined: there is one vehicle. */
 export function smallestDistance(
   result: Run,
   fleet: readonly VehicleData[],
@@ -81,18 +81,18 @@ export function smallestDistance(
   return found;
 }
 
-/** What acts in each step, or follows from inputs of its beginning. */
+/** Returns a column by steps: the value that acts in a step or follows from its first inputs. */
 export function inSteps(result: Run, name: string): Float64Array {
   return result.column(name).subarray(result.actingRow, result.rows - 1 + result.actingRow);
 }
 
-/** What is commanded: what the vehicle takes, or the allocation of one that takes no tau. */
+/** Returns the column of a command: an input of the vehicle, or of its allocation. */
 export function commandName(result: Run, vehicle: VehicleData, actuator: string): string {
   const taken = `${vehicle.vehicle}.tau.${actuator}`;
   return result.has(taken) ? taken : `${vehicle.allocation}.tau.${actuator}`;
 }
 
-/** Lower and upper limits of an actuator; undefined: they are no parameters of the vehicle. */
+/** Returns the limits of an actuator; undefined: they are not parameters of the vehicle. */
 export function limits(
   result: Run,
   { vehicle }: VehicleData,
@@ -104,10 +104,10 @@ export function limits(
 }
 
 /**
- * The indices of a run.
+ * Returns the indices of a vehicle.
  *
- * @param place of the vehicle that they are of.
- * @param fleet all vehicles, for what there is of several together.
+ * @param place number of the vehicle.
+ * @param fleet all vehicles, for the indices of several together.
  */
 export function metrics(result: Run, place: number, fleet: readonly VehicleData[]): Metrics {
   const found = result.metrics[place];

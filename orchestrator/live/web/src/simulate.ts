@@ -1,12 +1,12 @@
-// A run of a loop: its parameters, events and times for its program, and its rows.
-import { agendaOf, occurrences, type Places, parted, whyEnded } from "./events";
-import { Experiment, Refusal } from "./experiment";
-import { Module, REAL, type Reducer, type Refused } from "./program";
+// A run of a loop: its times, events and parameters for the program, and its rows.
+
+import { type Agenda, Module, REAL, type Reducer, type Refused } from "./program";
 import { general } from "./text";
 import type {
+  Action,
   Data,
+  EventData,
   LoopData,
-  Metrics,
   Occurrence,
   Options,
   Parameter,
@@ -14,6 +14,172 @@ import type {
   Value,
   Values,
 } from "./types";
+
+/** A refused value or time, with the reason. */
+export class Refusal extends Error {}
+
+/** Shares of the run, and of a step, below which a remainder is a rounding error. */
+const ROUNDING = 1e-9;
+const MOST_OF_A_STEP = 1e-3;
+
+/** Tells whether an event can happen at a time [s]: not before the start. */
+export function isTime(time: number): boolean {
+  return time >= 0 && time < Infinity;
+}
+
+/** Tells whether a duration is valid [s]. */
+export function isDuration(time: number): boolean {
+  return time > 0 && time < Infinity;
+}
+
+/** Rounds a number of steps if it is an integer apart from rounding errors. */
+function rounded(n: number): number {
+  const nearest = Math.round(n);
+  return Math.abs(n - nearest) <= Math.min(ROUNDING * nearest, MOST_OF_A_STEP) ? nearest : n;
+}
+
+export class Experiment {
+  /** Number of steps of full length. */
+  readonly fullSteps: number;
+  /** Number of all steps; the last is shorter if the run is not a multiple of the step. */
+  readonly steps: number;
+
+  /** Times are in seconds; more than `mostSteps` steps are refused. */
+  constructor(
+    readonly stopTime: number,
+    readonly step: number,
+    mostSteps: number,
+  ) {
+    for (const [name, time] of [
+      ["step", step],
+      ["stop time", stopTime],
+    ] as const) {
+      if (Number.isNaN(time)) throw new Refusal(`${name}: not a number`);
+      if (!isDuration(time)) throw new Refusal(`${name} ${time} s must be positive, and finite`);
+    }
+    const inSteps = rounded(Math.max(stopTime / step, Number.MIN_VALUE));
+    if (inSteps > mostSteps) {
+      throw new Refusal(
+        `${stopTime} s in steps of ${step} s are more than ${mostSteps} steps, too many for a page`,
+      );
+    }
+    this.fullSteps = Math.floor(inSteps);
+    this.steps = Math.ceil(inSteps);
+  }
+
+  /** Returns the time after k steps. */
+  time(k: number): number {
+    return k <= this.fullSteps ? k * this.step : this.stopTime;
+  }
+}
+
+/** Most entries of the same event in the list: a condition may chatter. */
+const MOST_LISTED = 1000;
+
+/** Numbers of an event, of an action, and of an entry in the list of occurrences. */
+const [EVENT, ACTION, LISTED] = [13, 4, 3];
+
+/** Kinds of actions, and comparisons, in the order of their numbers in events.c. */
+const KINDS = ["override", "bias", "freeze", "release", "set", "reset", "stop"];
+const COMPARISONS = ["<", "<=", ">", ">="];
+
+/** Numbers of the columns, inputs, parameters and components of a loop, by name. */
+interface Places {
+  readonly columns: ReadonlyMap<string, number>;
+  readonly inputs: ReadonlyMap<string, number>;
+  readonly parameters: ReadonlyMap<string, number>;
+  readonly components: ReadonlyMap<string, number>;
+}
+
+/** Splits a name into component and port, which may have dots: the longest component counts. */
+export function parted(
+  name: string,
+  components: { has(component: string): boolean },
+): [string, string] {
+  let dot = name.lastIndexOf(".");
+  while (dot > 0 && !components.has(name.slice(0, dot))) dot = name.lastIndexOf(".", dot - 1);
+  return [name.slice(0, dot), name.slice(dot + 1)];
+}
+
+function placeOf(places: ReadonlyMap<string, number>, name: string): number {
+  const found = places.get(name);
+  if (found === undefined) throw new Error(`there is no ${name}`);
+  return found;
+}
+
+/** Returns kind, place and value of each part of an action. */
+function actionsOf(action: Action, { inputs, parameters, components }: Places): number[][] {
+  const { kind } = action;
+  const known = (name: string) => KINDS.indexOf(name);
+  switch (kind) {
+    case "alter":
+      return action.values.map(([target, value]) => [
+        known(action.effect),
+        placeOf(inputs, target),
+        Number(value),
+      ]);
+    case "freeze":
+    case "release":
+      return action.targets.map((target) => [known(kind), placeOf(inputs, target), 0]);
+    case "set":
+      return [...action.parameters, ...action.inputs].map(([target, value]) => [
+        known(kind),
+        placeOf(parameters, target),
+        Number(value),
+      ]);
+    case "reset":
+      return action.components.map((name) => [known(kind), placeOf(components, name), 0]);
+    case "stop":
+      return [[known(kind), 0, 0]];
+  }
+}
+
+/** Returns events as numbers, in the order in which they act at the same time. */
+function agendaOf(events: readonly EventData[], places: Places): Agenda {
+  const rows = new Float64Array(events.length * EVENT);
+  const actions: number[] = [];
+  events.forEach(({ at, when, repeat, lasts, label, action }, i) => {
+    if (!isTime(at ?? 0)) throw new Refusal(`${label}: its time must be a number, 0 or more`);
+    if (!isDuration(lasts ?? 1)) throw new Refusal(`${label}: it must last for more than 0 s`);
+    const first = actions.length / ACTION;
+    for (const one of actionsOf(action, places)) actions.push(...one, 0);
+    const condition = when
+      ? [placeOf(places.columns, when.signal), COMPARISONS.indexOf(when.comparison), when.value]
+      : [0, 0, 0];
+    const timed = [Number(at !== undefined), at ?? 0];
+    const last = actions.length / ACTION;
+    rows.set([...timed, ...condition, Number(repeat ?? false), lasts ?? 0, first, last], i * EVENT);
+  });
+  const listed = 1 + events.length * MOST_LISTED * LISTED;
+  return { n: events.length, events: rows, actions: Float64Array.from(actions), listed };
+}
+
+/** Returns what has happened, in words. */
+export function occurrences(
+  events: readonly EventData[],
+  happened: Float64Array,
+  experiment: Experiment,
+): Occurrence[] {
+  const listed = events.map(() => 0);
+  return Array.from({ length: happened[0] }, (_, k) => {
+    const [event, step, ends] = happened.subarray(1 + k * LISTED);
+    listed[event] += 1;
+    const rest = listed[event] === MOST_LISTED ? "; later occurrences are not listed" : "";
+    const { text, label } = events[event];
+    return {
+      time: experiment.time(step),
+      text: (ends ? `${text}, ended` : text) + rest,
+      label: ends ? "" : label,
+      event,
+    };
+  });
+}
+
+/** Returns why an event has ended a run. */
+function whyEnded(events: readonly EventData[], happened: readonly Occurrence[]): string {
+  const { action } = events[happened[happened.length - 1].event];
+  return action.kind === "stop" ? action.why : "";
+}
 
 /** Runs loops by programs in modules. */
 export class Engine {
@@ -24,15 +190,15 @@ export class Engine {
     private readonly data: Data,
   ) {}
 
-  /** Make one of the compiled modules and what Python has written. */
+  /** Makes an engine from the compiled modules and the page's data. */
   static async load(modules: readonly BufferSource[], data: Data): Promise<Engine> {
     return new Engine(await Promise.all(modules.map((bytes) => Module.load(bytes))), data);
   }
 
   /**
-   * Runs a loop with its own values except for `values`; names that it lacks are left out.
+   * Runs a loop with its own values except for `values`; unknown names are ignored.
    *
-   * Throws `Refusal`, whose message says why, if a value or a time is not usable.
+   * Throws `Refusal` with the reason if a value or a time is not usable.
    */
   run(loop: LoopData, values: Values, { stopTime, step, events = [], spare }: Options): Result {
     const mostSteps = Math.floor(this.data.mostSteps / loop.vehicles.length);
@@ -58,26 +224,25 @@ export class Engine {
       agendaOf(events, layout),
       loop.measured.map((place) => this.reducers(place, layout, numbers, loop.actingRow)),
     );
-    if (found.rows === 0 && found.outcome === "refused")
-      throw new Refusal(whyRefused(found.refused, loop));
+    const refusal = found.outcome === "refused" ? whyRefused(found.refused, loop) : "";
+    if (refusal && found.rows === 0) throw new Refusal(refusal);
     const happened = occurrences(events, found.happened, experiment);
     const last = `t = ${general(experiment.time(found.refused.made), 12)} s`;
-    return new Table(
-      loop.actingRow,
-      layout,
-      copied(found.table, spare),
+    return {
+      ...rowsOf(layout, copied(found.table, spare)),
+      actingRow: loop.actingRow,
       parameters,
       happened,
-      found.metrics,
-      messages(loop, found.restarts),
-      found.outcome === "refused"
-        ? `stopped at ${last}: ${whyRefused(found.refused, loop)}`
-        : undefined,
-      found.outcome === "ended" ? `ended at ${last}: ${whyEnded(events, happened)}` : undefined,
-    );
+      metrics: found.metrics,
+      messages: messages(loop, found.restarts),
+      ...(refusal && { failure: `stopped at ${last}: ${refusal}` }),
+      ...(found.outcome === "ended" && {
+        remark: `ended at ${last}: ${whyEnded(events, happened)}`,
+      }),
+    };
   }
 
-  /** What makes the indices of a vehicle, in numbers. */
+  /** Returns the reducers of a vehicle's indices. */
   private reducers(
     place: number,
     { columns, parameters }: Layout,
@@ -86,7 +251,7 @@ export class Engine {
   ): Reducer[] {
     return this.data.measured[place].map(({ name, takes, gives }) => ({
       name,
-      // A row begins with the time.
+      // A row begins with the time; constants have -1.
       from: takes.map((one) => 1 + (columns.get(`${one}`) ?? -2)),
       constants: takes.map((one) => values[parameters.get(`${one}`) ?? -1] ?? Number(one)),
       actingRow,
@@ -101,11 +266,11 @@ export class Engine {
   }
 }
 
-/** The names of a loop, and their numbers. */
+/** Names of a loop, and their numbers. */
 interface Layout extends Places {
-  /** Of the columns. */
+  /** Names of the columns. */
   readonly names: readonly string[];
-  /** Outputs of no program, which are 0 in every row that is kept: after so many columns. */
+  /** Outputs that programs lack, as they are 0 in every row, by the number of columns before. */
   readonly faults: ReadonlyMap<number, string>;
 }
 
@@ -130,7 +295,7 @@ function layoutOf({ ports, parameters }: LoopData): Layout {
   };
 }
 
-/** The number that a value of a parameter is. */
+/** Checks a value of a parameter, and returns it as a number. */
 function numberOf({ name, type, choices, min, max }: Parameter, value: Value, layout: Layout) {
   const wanted = { Real: "number", Integer: "number", Boolean: "boolean", Enumeration: "string" }[
     type
@@ -138,7 +303,7 @@ function numberOf({ name, type, choices, min, max }: Parameter, value: Value, la
   if (choices && !Object.hasOwn(choices, `${value}`))
     throw new Refusal(`${name} = ${value}: not one of ${Object.keys(choices).join(", ")}`);
   if (Number.isNaN(value)) throw new Refusal(`${name}: not a number`);
-  // Integers have 32 bits: a larger one would become another without a word.
+  // Integers have 32 bits: a larger one would change silently.
   const fits = typeof value === wanted && (type !== "Integer" || (Number(value) | 0) === value);
   if (!fits) throw new Refusal(`${name} = ${value}: not a value of type ${type}`);
   const number = choices ? choices[`${value}`] : Number(value);
@@ -152,7 +317,7 @@ function numberOf({ name, type, choices, min, max }: Parameter, value: Value, la
   return number;
 }
 
-/** Which component has refused what, in words. */
+/** Describes a refusal. */
 function whyRefused({ component, call, port }: Refused, { ports, parameters }: LoopData) {
   const [name, { input }] = Object.entries(ports)[component];
   switch (call) {
@@ -169,16 +334,16 @@ function whyRefused({ component, call, port }: Refused, { ports, parameters }: L
   }
 }
 
-/** What components say of states that were started over. */
+/** Returns the messages of components whose states were reset. */
 function messages({ restarted }: LoopData, restarts: Float64Array): string[] {
   return Object.entries(restarted).flatMap(([name, text], i) =>
     restarts[i] < 0 ? [] : [`${name}: ${text.replace("{}", general(restarts[i]))}`],
   );
 }
 
-/** Rows of their own, in the memory of a result that nothing shows any more. */
+/** Copies rows, if possible into the memory of a result that is no longer shown. */
 function copied(rows: Float64Array, spare: Result | undefined): Float64Array {
-  // Megabytes that were never written take longer than all steps.
+  // Writing to fresh memory takes longer than all steps.
   const free = spare?.table.buffer;
   const isFit = free instanceof ArrayBuffer && free.byteLength === REAL * rows.length;
   const table = isFit ? new Float64Array(free) : new Float64Array(rows.length);
@@ -186,51 +351,21 @@ function copied(rows: Float64Array, spare: Result | undefined): Float64Array {
   return table;
 }
 
-/** The rows of a run. */
-class Table implements Result {
-  readonly columns: readonly string[];
-  readonly faults: ReadonlyMap<number, string>;
-  readonly rows: number;
-  private readonly places: ReadonlyMap<string, number>;
-  private readonly made = new Map<string, Float64Array>();
-  readonly failure?: string;
-  readonly remark?: string;
-
-  constructor(
-    readonly actingRow: number,
-    layout: Layout,
-    readonly table: Float64Array,
-    readonly parameters: Values,
-    readonly happened: readonly Occurrence[],
-    readonly metrics: readonly Metrics[],
-    readonly messages: readonly string[],
-    failure: string | undefined,
-    remark: string | undefined,
-  ) {
-    this.columns = layout.names;
-    this.faults = layout.faults;
-    this.rows = table.length / (1 + this.columns.length);
-    this.places = layout.columns;
-    if (failure !== undefined) this.failure = failure;
-    if (remark !== undefined) this.remark = remark;
-  }
-
-  get time(): Float64Array {
-    return this.column("time");
-  }
-
-  has(name: string): boolean {
-    return this.places.has(name);
-  }
-
-  column(name: string): Float64Array {
-    const known = this.made.get(name);
+/** Returns the columns of a table of rows; a column is copied when it is first read. */
+function rowsOf({ names, faults, columns }: Layout, table: Float64Array) {
+  const width = 1 + names.length;
+  const rows = table.length / width;
+  const copies = new Map<string, Float64Array>();
+  const column = (name: string) => {
+    const known = copies.get(name);
     if (known !== undefined) return known;
-    const place = name === "time" ? 0 : 1 + (this.places.get(name) ?? Number.NaN);
+    const place = name === "time" ? 0 : 1 + (columns.get(name) ?? Number.NaN);
     if (Number.isNaN(place)) throw new Error(`there is no column ${name}`);
-    const [width, column] = [1 + this.columns.length, new Float64Array(this.rows)];
-    for (let k = 0; k < this.rows; k++) column[k] = this.table[k * width + place];
-    this.made.set(name, column);
-    return column;
-  }
+    const values = new Float64Array(rows);
+    for (let k = 0; k < rows; k++) values[k] = table[k * width + place];
+    copies.set(name, values);
+    return values;
+  };
+  const has = (name: string) => columns.has(name);
+  return { columns: names, faults, rows, table, time: column("time"), has, column };
 }

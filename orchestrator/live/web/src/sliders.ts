@@ -1,12 +1,12 @@
-// Which parameters have sliders, under which headings, and how positions stand for values.
+// Sliders: their parameters and headings, and the values of their positions.
 
 import type { VehicleData } from "./types";
 
 /** Positions of a slider, from 0. */
 export const POSITIONS = 1000;
 
-/** A range of values, evenly spaced, or by factors; `zero`: its first position is zero. */
-export interface Scale {
+/** A range of values, linear or logarithmic; if `zero` is set, its first position is zero. */
+interface Scale {
   readonly low: number;
   readonly high: number;
   readonly log?: boolean;
@@ -17,16 +17,16 @@ export interface Scale {
 export interface Slider {
   /** HTML. */
   readonly label: string;
-  /** What readers of the screen say, where the slider sets several parameters. */
+  /** Text for screen readers, for a slider that sets several parameters. */
   readonly spoken?: string;
-  /** What the slider sets together; each also has a field. */
+  /** Parameters that the slider sets together; each also has a field. */
   readonly names: readonly string[];
-  /** What the slider's value is multiplied by, for each of them. */
+  /** Factor of the slider's value for each parameter. */
   readonly signs?: readonly number[];
   readonly scale: Scale;
 }
 
-export interface Group {
+interface Group {
   readonly title: string;
   readonly open?: boolean;
   readonly rows: readonly Slider[];
@@ -127,8 +127,8 @@ export const GROUPS: readonly Group[] = [
   },
 ];
 
-/** The same slider for the components of a vehicle; above they have the names of a single one. */
-export function of(vehicle: VehicleData, slider: Slider): Slider {
+/** Returns a slider for the components of a vehicle; `GROUPS` has the names of a single vehicle. */
+export function sliderOf(vehicle: VehicleData, slider: Slider): Slider {
   const names = { ...vehicle, plant: vehicle.vehicle };
   const named = (text: string) =>
     text.replace(/\b(plant|controller|planner|disturbance)(?=\.)/, (role) => {
@@ -142,7 +142,7 @@ export function of(vehicle: VehicleData, slider: Slider): Slider {
   };
 }
 
-/** The value at a position, with no more digits than the position tells apart. */
+/** Returns the value at a position, with no more digits than positions can distinguish. */
 export function valueAt(scale: Scale, position: number): number {
   const { low, high, log, zero, whole } = scale;
   if (zero && position <= 0) return 0;

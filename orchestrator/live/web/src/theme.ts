@@ -1,21 +1,21 @@
-// Colours of the page, light and dark, as the style sheet has them.
+// Colours of the page, light and dark, from the style sheet.
 
-import type { Colour } from "./lines";
+import type { Colour } from "./meshes";
 
 export interface Palette {
   background: Colour;
-  /** Of each controller. */
+  /** Colour of each controller. */
   controllers: readonly [Colour, Colour];
   reference: Colour;
-  /** The upper fin. */
+  /** Colour of the upper fin. */
   highlight: Colour;
   grid: Colour;
 }
 
-/** Values read since the theme last changed: charts ask often. */
+/** Values read since the theme last changed: charts need them often. */
 const known = new Map<string, string>();
 
-/** The value of a custom property, such as `--text`. */
+/** Returns the value of a custom property, such as `--text`. */
 export function property(name: string): string {
   const found =
     known.get(name) ?? getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -23,7 +23,7 @@ export function property(name: string): string {
   return found;
 }
 
-/** The colour that `#rrggbb` is. */
+/** Reads a colour `#rrggbb`. */
 function parsed(text: string): Colour {
   return [1, 3, 5].map((i) => Number.parseInt(text.slice(i, i + 2), 16) / 255) as unknown as Colour;
 }
@@ -36,15 +36,15 @@ export function mixed(a: Colour, b: Colour, share: number): Colour {
   return a.map((value, k) => value + (b[k] - value) * share) as unknown as Colour;
 }
 
-/** A vehicle's colour, lighter where the page is dark. */
+/** Returns a vehicle's colour, lighter on a dark page. */
 export function vehicleColour(text: string): Colour {
   return mixed(parsed(text), [1, 1, 1], Number.parseFloat(property("--lighter")) / 100);
 }
 
-/** How much nearer to the text's the second controller's colour is, where both have a vehicle's. */
+/** Share of the text's colour in the second controller's, if both have a vehicle's colour. */
 const SECOND = 0.35;
 
-/** Has the lines of all controllers in a vehicle's colour; undefined: each in its own. */
+/** Gives the lines of all controllers a vehicle's colour; undefined: each its own. */
 export function colourLines(text: string | undefined): void {
   known.clear();
   const { style } = document.documentElement;
@@ -70,12 +70,12 @@ export function palette(): Palette {
   };
 }
 
-/** Follows the system until the button is pressed; `changed` is told of every change. */
+/** Sets the theme: the system's until the button is pressed; calls `changed` at every change. */
 export function themeButton(button: HTMLButtonElement, changed: () => void): void {
   const system = matchMedia("(prefers-color-scheme: dark)");
   const root = document.documentElement;
   const isDark = () => (root.dataset.theme ?? (system.matches ? "dark" : "light")) === "dark";
-  const say = () => {
+  const update = () => {
     button.textContent = isDark() ? "Light" : "Dark";
     button.setAttribute("aria-label", isDark() ? "Light colours" : "Dark colours");
     known.clear();
@@ -83,8 +83,8 @@ export function themeButton(button: HTMLButtonElement, changed: () => void): voi
   };
   button.addEventListener("click", () => {
     root.dataset.theme = isDark() ? "light" : "dark";
-    say();
+    update();
   });
-  system.addEventListener("change", say);
-  say();
+  system.addEventListener("change", update);
+  update();
 }

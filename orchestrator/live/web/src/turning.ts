@@ -1,10 +1,10 @@
-// Turns and zooms the scene by pointer, touch and keys.
+// Rotation and zoom of the scene by pointer, touch and keys.
 
 import type { View } from "./space";
 
 const START: View = { azimuth: -0.72, elevation: 0.36 };
 
-/** Turn for a pixel, and for a press of an arrow key [rad]. */
+/** Rotation per pixel, and per press of an arrow key [rad]. */
 const DRAG = 0.009;
 const KEY = 0.12;
 
@@ -31,7 +31,7 @@ export class Turning {
     canvas.addEventListener(
       "wheel",
       (event) => {
-        // The wheel by itself scrolls the page; pinching a touchpad arrives with ctrlKey.
+        // The wheel without a key scrolls the page; browsers report a pinch with ctrlKey.
         if (!event.ctrlKey && !event.metaKey) return;
         event.preventDefault();
         this.#zoomBy(Math.exp(-0.004 * event.deltaY));

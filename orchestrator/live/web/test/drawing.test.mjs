@@ -1,10 +1,10 @@
-// What sliders, axes and readouts compute, against numbers worked out by hand.
+// Results of sliders, axes and number formats, against numbers worked out by hand.
 import assert from "node:assert/strict";
 import test from "node:test";
 import { load } from "./load.mjs";
 
 const { valueAt, positionOf, POSITIONS } = await load("sliders");
-const { tick } = await load("charts");
+const { tick } = await load("text");
 const { columnLines, columnSections } = await load("panels");
 const { boxOf, distanceFor, drawn, eyeAxes, rotation, ticks } = await load("space");
 
@@ -37,7 +37,7 @@ test("positions follow values, and stay on the slider", () => {
   );
 });
 
-test("a turn by a quarter takes x to y, and pitch lifts the nose", () => {
+test("a quarter turn takes x to y, and pitch lifts the nose", () => {
   const yaw = rotation(0, 0, Math.PI / 2);
   for (const [row, wanted] of [0, 1, 0].entries()) near(yaw[3 * row], wanted);
   const pitch = rotation(0, Math.PI / 2, 0);
@@ -67,7 +67,7 @@ test("round numbers between the ends", () => {
   assert.deepEqual(ticks(1, 1, 5), []);
 });
 
-test("a box holds all points, and something where there are none", () => {
+test("a box contains all points, and has a size without any", () => {
   assert.deepEqual(boxOf([Float64Array.of(0, 1, 2, 4, -3, 2)], 1), {
     low: [-1, -4, 1],
     high: [5, 2, 3],
@@ -75,9 +75,9 @@ test("a box holds all points, and something where there are none", () => {
   assert.deepEqual(boxOf([], 0), { low: [-1, -1, -1], high: [1, 1, 1] });
 });
 
-test("the eye stands so far away that a cube just fits", () => {
+test("at the distance of the eye a cube just fits", () => {
   const box = { low: [-1, -1, -1], high: [1, 1, 1] };
-  // From the front: the near face is one in front of the middle, and one high.
+  // From the front, the near face is at distance 1 from the middle, with half height 1.
   near(distanceFor(box, { azimuth: 0, elevation: 0 }, Math.PI / 4, 1), 2);
   near(distanceFor(box, { azimuth: 0, elevation: 0 }, Math.PI / 4, 0.5), 3);
   const [right, up, back] = eyeAxes({ azimuth: 0, elevation: 0 });
@@ -91,7 +91,7 @@ test("the eye stands so far away that a cube just fits", () => {
   );
 });
 
-test("labels of an axis are short, differ, and lose no digit", () => {
+test("labels of an axis are short, distinct, and keep all digits", () => {
   const labels = [0, 1, -0.5, 99999, 1e5, -1e6, 1.5e6, 2e9, 2.5e-5, 0.001].map(tick);
   const wanted = ["0", "1", "−0.5", "99999", "1e5", "−1e6", "1.5e6", "2e9", "2.5e−5", "0.001"];
   assert.deepEqual(labels, wanted);

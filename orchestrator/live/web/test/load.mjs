@@ -1,7 +1,8 @@
-// Loads a module of the page into Node.
+// Modules of the page in Node, and data of a page.
 import { fileURLToPath } from "node:url";
 import { build } from "esbuild";
 
+/** Loads a module of the page. */
 export async function load(name) {
   const { outputFiles } = await build({
     entryPoints: [fileURLToPath(new URL(`../src/${name}.ts`, import.meta.url))],
@@ -83,7 +84,7 @@ const loop = (label, controller, more) => ({
   ...more,
 });
 
-/** A page's data with one preset, without programs. */
+/** A preset with two loops, without programs. */
 export const preset = {
   name: "fault",
   title: "",
@@ -119,7 +120,7 @@ const ofEach = (name) =>
     )
     .concat(parameter(`${name}.count`, 2));
 
-/** The same of two vehicles and a leader that is no part of them. */
+/** A preset with two vehicles, and a leader that is not part of a vehicle. */
 export const fleet = {
   ...preset,
   name: "fleet",
@@ -142,6 +143,8 @@ export const fleet = {
   colours: ["#0072B2", "#D55E00"],
   references: ["#0072B2", "#D55E00"],
 };
+
+/** Data of a page with these presets. */
 export const data = {
   opened: "fault",
   mostSteps: 200_000,

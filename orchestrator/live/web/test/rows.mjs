@@ -1,5 +1,5 @@
 // Writes the rows of presets: `node rows.mjs ENGINE MODULES DATA FOLDER`, with commas between the
-// modules; a file of doubles for each loop, and what else there is to say of the runs on the output.
+// modules. Writes a file of doubles for each loop, and all else about the runs to the output.
 import { readFileSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 

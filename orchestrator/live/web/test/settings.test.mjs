@@ -1,4 +1,4 @@
-// Settings, the link and the command line, against texts written out.
+// Settings, links and command lines, against texts written out.
 import assert from "node:assert/strict";
 import test from "node:test";
 import { data, fleet, load, preset } from "./load.mjs";
@@ -6,20 +6,20 @@ import { data, fleet, load, preset } from "./load.mjs";
 const { fromHash, toHash } = await load("link");
 const { untouched, withEdit, withValues, eventsOf } = await load("settings");
 const { commandLine, toToml } = await load("command");
-const { parted } = await load("events");
-const { names } = await load("field");
-const { GROUPS, of } = await load("sliders");
+const { parted } = await load("simulate");
+const { names } = await load("controls");
+const { GROUPS, sliderOf } = await load("sliders");
 
 const start = untouched(preset);
 
-test("a value that is the preset's is no change", () => {
+test("the preset's value is not a change", () => {
   const changed = withValues(start, preset, { "controller.eps_t": 3, "plant.noise.std": 0 });
   assert.deepEqual(changed.values, { "controller.eps_t": 3, "plant.noise.std": 0 });
   const back = withValues(changed, preset, { "controller.eps_t": 10 });
   assert.deepEqual(back.values, { "plant.noise.std": 0 });
 });
 
-test("a value is a change if one of the loops has another, until it is taken back", () => {
+test("a value is a change if one of the loops has another, until it is reset", () => {
   const [own, other] = preset.loops;
   const longer = other.parameters.map((one) =>
     one.name === "plant.noise.std" ? { ...one, value: 0.5 } : one,
@@ -30,13 +30,13 @@ test("a value is a change if one of the loops has another, until it is taken bac
   assert.deepEqual(withValues(changed, apart, { "plant.noise.std": undefined }).values, {});
 });
 
-test("a time that is the event's own is no change", () => {
+test("the event's own time is not a change", () => {
   const changed = withEdit(start, preset, 0, { at: 40, lasts: null });
   assert.deepEqual(changed.edits, { 0: { at: 40, lasts: null } });
   assert.deepEqual(withEdit(changed, preset, 0, { at: 50, lasts: 10 }).edits, {});
 });
 
-test("an edited event keeps what it does", () => {
+test("an edited event keeps its action", () => {
   const [first, second] = eventsOf(
     withEdit(start, preset, 0, { at: 40, lasts: null }),
     preset.loops[0],
@@ -47,7 +47,7 @@ test("an edited event keeps what it does", () => {
   assert.deepEqual(second, preset.loops[0].events.fault[1]);
 });
 
-test("a link holds what differs, and reads back as the same settings", () => {
+test("a link contains the changes, and reads back as the same settings", () => {
   assert.equal(toHash(start, data), "#preset=fault");
   let changed = withValues(start, preset, {
     "controller.K1[1]": 2.5e-7,
@@ -71,7 +71,7 @@ test("a link without events has none", () => {
   assert.deepEqual(fromHash("#preset=fault&events=", data).settings, none);
 });
 
-test("what a link says wrongly is named and left out", () => {
+test("invalid fields of a link are listed and ignored", () => {
   const { settings, unknown } = fromHash(
     "#preset=no&controller.eps_t=x&plant.lost=1&stop_time=",
     data,
@@ -80,7 +80,7 @@ test("what a link says wrongly is named and left out", () => {
   assert.deepEqual(unknown, ["preset=no", "controller.eps_t=x", "plant.lost=1", "stop_time="]);
 });
 
-test("a controller is hidden once, and a second preset is named", () => {
+test("a controller is hidden once, and a second preset is listed as unknown", () => {
   const { settings, unknown } = fromHash("#preset=fault&hide=PD&preset=path&hide=PD", data);
   assert.deepEqual(settings, { ...start, hidden: ["PD"] });
   assert.deepEqual(unknown, ["preset=path"]);
@@ -94,7 +94,7 @@ test("an event that cannot end has no duration", () => {
   assert.deepEqual(unknown, ["events.1.for=2"]);
 });
 
-test("a link has no events, times and durations that a scenario file could not have", () => {
+test("a link accepts no events, times or durations that are invalid in a scenario file", () => {
   const wrong = [
     "events=constructor",
     "events.1.at=-1",
@@ -110,7 +110,7 @@ test("a link has no events, times and durations that a scenario file could not h
   assert.deepEqual(unknown, wrong);
 });
 
-test("an edit belongs to the same event in a loop that lacks another", () => {
+test("an edit belongs to the same event in a loop with fewer events", () => {
   const [, second] = preset.loops[0].events.fault;
   const other = { ...preset.loops[1], events: { fault: [second] } };
   const changed = withEdit(start, preset, 0, { at: 40 });
@@ -118,7 +118,7 @@ test("an edit belongs to the same event in a loop that lacks another", () => {
   assert.equal(eventsOf(withEdit(start, preset, 1, { lasts: 3 }), other)[0].lasts, 3);
 });
 
-test("names of a user's scenario are one word of the shell", () => {
+test("the name of a user's scenario is one word of the shell", () => {
   const [own, other] = preset.loops;
   const file = { ...own, scenario: "/tmp/my $(runs)/it's.toml" };
   assert.equal(commandLine(start, preset, file), "auv-fmu run '/tmp/my $(runs)/it'\\''s.toml'");
@@ -126,11 +126,11 @@ test("names of a user's scenario are one word of the shell", () => {
   assert.equal(text.split("\n")[0], "cat > fault-..-my-PD-.toml <<'END'");
 });
 
-test("an empty link is the preset that is opened", () => {
+test("an empty link opens the first preset", () => {
   assert.deepEqual(fromHash("", data), { settings: start, unknown: [] });
 });
 
-test("the command has what differs, for the parameters of its loop", () => {
+test("the command has the changes of its loop's parameters", () => {
   const [own] = preset.loops;
   assert.equal(commandLine(start, preset, own), "auv-fmu run fault");
   const changed = withValues({ ...start, stopTime: 50, step: 0.01 }, preset, {
@@ -143,7 +143,7 @@ test("the command has what differs, for the parameters of its loop", () => {
   );
 });
 
-test("edited events are a file", () => {
+test("edited events are written into a file", () => {
   const changed = withEdit(start, preset, 0, { at: 40 });
   assert.equal(
     commandLine(changed, preset, preset.loops[0]),
@@ -163,12 +163,12 @@ auv-fmu run fault --events fault-events.toml`,
   );
 });
 
-test("no events are a file that says so", () => {
+test("an empty set of events is written into a file", () => {
   const text = commandLine({ ...start, events: "" }, preset, preset.loops[0]);
   assert.equal(text.split("\n")[1], "events = []");
 });
 
-test("a loop without a scenario is a scenario file", () => {
+test("a loop without a scenario is written as a scenario file", () => {
   const changed = withValues({ ...start, events: "" }, preset, { "plant.noise.std": 0 });
   assert.equal(
     commandLine(changed, preset, preset.loops[1]),
@@ -195,14 +195,14 @@ auv-fmu run fault-PD.toml`,
   );
 });
 
-test("a name is parted after the longest component that it begins with", () => {
+test("a name is split after the longest component that it begins with", () => {
   const components = new Set(["auv1.plant", "leader", "auv1"]);
   assert.deepEqual(parted("auv1.plant.eta.x", components), ["auv1.plant", "eta.x"]);
   assert.deepEqual(parted("leader.waypoint[1].x", components), ["leader", "waypoint[1].x"]);
   assert.deepEqual(parted("auv1.eta.x", components), ["auv1", "eta.x"]);
 });
 
-test("a message names a parameter of one vehicle, and not the one of another", () => {
+test("a message names the parameter of one vehicle only", () => {
   const said = "auv1.plant: m11 = -1: must be at least 1e-09";
   assert.ok(names(said, "auv1.plant.m11"));
   assert.ok(!names(said, "auv2.plant.m11"));
@@ -215,13 +215,13 @@ test("sliders set the parameters of their vehicle", () => {
   const rows = GROUPS.flatMap((group) => group.rows);
   const [own, other] = [preset, fleet].map(({ loops }) => loops[0].vehicles.at(-1));
   for (const row of rows) {
-    assert.deepEqual(of(own, row), row);
+    assert.deepEqual(sliderOf(own, row), row);
     assert.deepEqual(
-      of(other, row).names,
+      sliderOf(other, row).names,
       row.names.map((name) => `auv2.${name}`),
     );
   }
-  const spoken = rows.map((row) => of(other, row).spoken).filter(Boolean);
+  const spoken = rows.map((row) => sliderOf(other, row).spoken).filter(Boolean);
   assert.ok(spoken.includes("limits of auv2.plant.tau.u"));
 });
 
@@ -238,7 +238,7 @@ test("a link names a vehicle that is not the first", () => {
   });
 });
 
-test("vehicles without a scenario are a scenario file with their number", () => {
+test("the scenario file of several vehicles has their number", () => {
   const text = commandLine({ ...untouched(fleet), stopTime: 50 }, fleet, fleet.loops[0]);
   const wanted = [
     "stop_time = 50",
@@ -251,7 +251,7 @@ test("vehicles without a scenario are a scenario file with their number", () => 
   for (const line of wanted) assert.ok(text.split("\n").includes(line), line);
 });
 
-test("all actions have their word in a scenario file", () => {
+test("all actions can be written into a scenario file", () => {
   const action = (one) => toToml([{ text: "", label: "", at: 0, action: one }]).split("\n")[2];
   assert.equal(
     action({

@@ -1,5 +1,6 @@
-// Writes tables as a script asks the page for them: `node tables.mjs ENGINE MODULES DATA`, with
-// commas between the modules, and a list of changes of settings on the input; on the output, the digest of the table after each of them.
+// Writes digests of tables after changes of settings: `node tables.mjs ENGINE MODULES DATA`, with
+// commas between the modules. Reads a list of changes in JSON; writes a list with the digest of the
+// table, or the refusal, after each.
 import { createHash } from "node:crypto";
 import { readFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";

@@ -32,18 +32,18 @@ from support.programs import compiled, play
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
-#: Numbers that stand for what an action is, and for a comparison, in events.c.
+#: Numbers of the kinds of actions, and comparisons in the order of their numbers, in events.c.
 OVERRIDE, BIAS, FREEZE, RELEASE, SET, RESET, END = range(7)
 COMPARISONS = ("<", "<=", ">", ">=")
 
-#: How many numbers an event is, and something that has happened.
+#: Numbers of an event, and of an entry in the list of occurrences.
 EVENT, LISTED = 13, 3
 
 ORDERS = ("feedthrough", "gauss-seidel", "jacobi")
 
 
 def runs(scenario: str, order: str | None = None, **request: Any) -> list[Prepared]:
-    """A scenario, and what it is compared with."""
+    """Prepare a scenario and its comparison."""
     asked = Request(scenario, kind="native", order=order, **request)
     own = prepare(*load_scenario(scenario, "native"), asked)
     return with_companion(own, asked)
@@ -69,7 +69,7 @@ def check(run: Prepared, folder: Path) -> None:
 
 
 def numbers_of(text: Text, events: Sequence[Event]) -> tuple[np.ndarray, np.ndarray]:
-    """What is to happen, and its actions, as events.c has them: a row each."""
+    """Return events and their actions as events.c has them, a row each."""
     columns = {name: i for i, name in enumerate(text.columns)}
     found, actions = np.zeros((len(events), EVENT)), list[tuple[float, ...]]()
     for row, event in zip(found, events, strict=True):
@@ -85,7 +85,7 @@ def numbers_of(text: Text, events: Sequence[Event]) -> tuple[np.ndarray, np.ndar
 
 
 def actions_of(text: Text, action: Action) -> Iterator[tuple[float, float, float]]:
-    """What each is, which input, parameter or component it is about, and a value."""
+    """Yield the kind of each action, its input, parameter or component, and a value."""
     parameters = {name: i for i, name in enumerate(text.parameters)}
     match action:
         case Alter(effect, values):
@@ -107,7 +107,7 @@ def actions_of(text: Text, action: Action) -> Iterator[tuple[float, float, float
 def occurrences(
     events: Sequence[Event], happened: np.ndarray, experiment: Experiment
 ) -> Iterator[Occurrence]:
-    """What has happened, in the master's words."""
+    """Yield what has happened, in the master's words."""
     listed = [0] * len(events)
     for number, step, ends in happened[1:].reshape(-1, LISTED)[: int(happened[0])].astype(int):
         listed[number] += 1

@@ -1,11 +1,11 @@
-"""Where noise is a term of a sum, and where it is not."""
+"""Noise that is a term of a sum, and noise that is not."""
 
 from __future__ import annotations
 
 import pytest
 
 from fmus.language.build import Program
-from orchestrator.program.noise import is_added
+from orchestrator.program.kind import is_added
 from support.language import module_of
 
 TEXT = """

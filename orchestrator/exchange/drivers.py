@@ -1,11 +1,11 @@
-"""Tools in environments of their own: `python drivers.py FUNCTION JOB.json ROWS.csv`.
+"""Run a host in its own environment: `python drivers.py FUNCTION JOB.json ROWS.csv`.
 
-It is run by the Python of such an environment, so it imports one tool and the standard library. JOB
-names the FMUs, the wires, the steps and the outputs that are wanted; into ROWS go the seconds that
-the steps took, and the wanted outputs after every step.
+The Python of that environment runs this file, so it imports one tool and the standard library. JOB
+names the FMUs, wires, steps and wanted outputs. The first row of ROWS has the seconds of the steps;
+the others have the wanted outputs after every step.
 """
 
-# ruff: noqa: PLC0415 - only one of the tools is there
+# ruff: noqa: PLC0415 - only one of the tools is installed
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ from typing import Any, NamedTuple
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
-#: The name of a job in its folder.
+#: Name of the job file in its folder.
 JOB = "job.json"
 
 #: Wanted outputs after every step.
 Rows = Sequence[Sequence[float]]
 
-#: These, and the seconds of the steps.
+#: Rows, and the seconds of the steps.
 Result = tuple[Rows, float]
 
 
 class Job:
-    """What is to be run.
+    """A run.
 
     Attributes:
-        fmus: the paths of the FMUs, by the names of the components.
-        wires: source and target, each a component and a port.
-        wanted: outputs that are recorded, each a component and a port.
-        steps: how many.
+        fmus: paths of the FMUs by component.
+        wires: pairs of source and target, each a component and a port.
+        wanted: recorded outputs, each a component and a port.
+        steps: number of steps.
         step: communication step [s].
 
     """
@@ -52,17 +52,17 @@ class Job:
         self.step: float = content["step"]
 
     def inputs(self, name: str) -> list[str]:
-        """Inputs of a component that are fed."""
+        """Return the connected inputs of a component."""
         return [port for _, (owner, port) in self.wires if owner == name]
 
     def outputs(self, name: str) -> list[str]:
-        """Outputs of a component that feed something, or are wanted, each once."""
+        """Return the outputs of a component that are connected or wanted, each once."""
         used = [source for source, _ in self.wires] + self.wanted
         return list(dict.fromkeys(port for owner, port in used if owner == name))
 
 
 def sofirpy(job: Job) -> Result:
-    """`simulate`, which logs at the start, and after every step."""
+    """Run `simulate`, which logs at the start and after every step."""
     from sofirpy import simulate
 
     connections = defaultdict(list)
@@ -75,21 +75,20 @@ def sofirpy(job: Job) -> Result:
             }
         )
     logged = {name: job.outputs(name) for name in dict(job.wanted)}
-    begin = perf_counter()
-    # It cuts off what lies beyond the end, where rounding may put the last step.
-    table = simulate(
+    # The tool cuts off steps beyond the end, and rounding may put the last step there.
+    table, seconds = _timed(
+        simulate,
         stop_time=(job.steps + 0.5) * job.step,
         step_size=job.step,
         fmu_paths={name: Path(path) for name, path in job.fmus.items()},
         connections_config=dict(connections),
         parameters_to_log=logged,
     )
-    seconds = perf_counter() - begin
     return table[[f"{name}.{port}" for name, port in job.wanted]].values.tolist()[1:], seconds
 
 
 def syssimx(job: Job, algorithm: str = "JacobiAlgorithm") -> Result:
-    """A `System` of `FMUComponent`s, which keep their histories, the start with them."""
+    """Run a `System` of `FMUComponent`s, which keep their histories, including the start."""
     from syssimx import Connection, System
     from syssimx.components.fmu import FMUComponent
     from syssimx.system import algorithms
@@ -101,24 +100,22 @@ def syssimx(job: Job, algorithm: str = "JacobiAlgorithm") -> Result:
         system.add_connection(Connection(source, output, target, taking))
     system.set_algorithm(getattr(algorithms, algorithm)())
     system.initialize(t0=0.0)
-    begin = perf_counter()
-    result = system.run(t0=0.0, tf=job.steps * job.step, dt=job.step)
-    seconds = perf_counter() - begin
+    result, seconds = _timed(system.run, t0=0.0, tf=job.steps * job.step, dt=job.step)
     columns = [result[name][1][port] for name, port in job.wanted]
-    # It adds up its time, and where that ends below the end makes a last step of next to nothing.
-    return [list(row) for row in zip(*columns, strict=True)][1 : job.steps + 1], seconds
+    # The tool adds up its time, and makes a tiny last step if the sum falls short of the end.
+    return _rows(columns)[1 : job.steps + 1], seconds
 
 
 def syssimx_gauss_seidel(job: Job) -> Result:
-    """The same in the order that the tool takes if it is given none."""
+    """Run the same in the tool's default order."""
     return syssimx(job, "GaussSeidelAlgorithm")
 
 
 def gemseo_fmu(job: Job) -> Result:
-    """A `TimeSteppingSystem`, which couples by equal names.
+    """Run a `TimeSteppingSystem`, which couples variables of the same name.
 
-    So every discipline is told its ports: some outputs and parameters have one name in several
-    FMUs. Without inputs is None; an empty list is all inputs and parameters.
+    Every discipline gets its ports explicitly, as some outputs and parameters have the same name in
+    several FMUs. `input_names=None` means no inputs; an empty list means all inputs and parameters.
     """
     from gemseo_fmu.disciplines.do_step_fmu_discipline import DoStepFMUDiscipline
     from gemseo_fmu.disciplines.time_stepping_system import TimeSteppingSystem
@@ -137,16 +134,14 @@ def gemseo_fmu(job: Job) -> Result:
             )
         )
     system = TimeSteppingSystem(disciplines, job.steps * job.step, job.step)
-    begin = perf_counter()
-    data = system.execute()
-    seconds = perf_counter() - begin
+    data, seconds = _timed(system.execute)
     columns = [data[":".join(port)] for port in job.wanted]
-    # The same here.
-    return [[float(x) for x in row] for row in zip(*columns, strict=True)][: job.steps], seconds
+    # This tool, too, may make a tiny last step.
+    return _rows(columns)[: job.steps], seconds
 
 
 def pathsim_fmi(job: Job) -> Result:
-    """A block for each FMU, and a `Scope`."""
+    """Run a block for each FMU, and a `Scope`."""
     from pathsim import Connection, Simulation
     from pathsim.blocks import Scope
     from pathsim_fmi import CoSimulationFMU
@@ -164,16 +159,14 @@ def pathsim_fmi(job: Job) -> Result:
         Connection(blocks[name][port], scope[i]) for i, (name, port) in enumerate(job.wanted)
     ]
     simulation = Simulation([*blocks.values(), scope], connections, dt=job.step, log=False)
-    begin = perf_counter()
-    simulation.run(job.steps * job.step)
-    seconds = perf_counter() - begin
+    _, seconds = _timed(simulation.run, job.steps * job.step)
     _, columns = scope.read()
-    # At t it steps what it then shows: its row of t = 0 is ours after the first step.
-    return [[float(x) for x in row] for row in zip(*columns, strict=True)][: job.steps], seconds
+    # The row at t is recorded after the step from t: its row at 0 is ours after the first step.
+    return _rows(columns)[: job.steps], seconds
 
 
 def cofmupy(job: Job) -> Result:
-    """A `Coordinator`, as its configuration is without a word about the method: Jacobi."""
+    """Run a `Coordinator` with its default method, Jacobi."""
     from cofmupy import Coordinator
 
     targets = defaultdict(list)
@@ -194,13 +187,13 @@ def cofmupy(job: Job) -> Result:
     seconds = perf_counter() - begin
     results = coordinator.get_results()
     columns = [results[port] for port in job.wanted]
-    return [[float(x) for x in row] for row in zip(*columns, strict=True)], seconds
+    return _rows(columns), seconds
 
 
 def sdf4sim(job: Job) -> Result:
-    """A graph of the tool's agents, with an initial token of zero on every wire.
+    """Run a graph of the tool's agents, with an initial token of zero on every wire.
 
-    Its agent of an FMU needs an input, so what has none gets an agent of ours, as does what
+    The tool's agent of an FMU needs an input, so `Source` stands in for FMUs without any; `Sink`
     records.
     """
     from sdf4sim import cs, sdf
@@ -208,7 +201,7 @@ def sdf4sim(job: Job) -> Result:
     step = Fraction(job.step).limit_denominator(10**6)
 
     class Source(sdf.Agent):  # type: ignore[misc]
-        """An FMU without inputs, stepped as `cs.Simulator` steps the others."""
+        """An FMU without inputs, stepped as `cs.Simulator` does."""
 
         def __init__(self, slave: Any) -> None:
             self.fmu, self.times = slave.fmu, count()
@@ -229,7 +222,7 @@ def sdf4sim(job: Job) -> Result:
             return {name: [value] for name, value in zip(self.numbers, values, strict=True)}
 
     class Sink(sdf.Agent):  # type: ignore[misc]
-        """Takes what is wanted; the tool's results keep it."""
+        """Receives the wanted outputs, which the tool's results keep."""
 
         @property
         def inputs(self) -> dict[str, Any]:
@@ -254,22 +247,21 @@ def sdf4sim(job: Job) -> Result:
         sdf.Buffer(sdf.Src(*port), sink, deque())
         for port, sink in zip(job.wanted, sinks, strict=True)
     ]
-    begin = perf_counter()
-    results = sdf.sequential_run((agents, buffers), sdf.iterations_expired(job.steps))
-    seconds = perf_counter() - begin
-    return [list(row) for row in zip(*(results[sink] for sink in sinks), strict=True)], seconds
+    end = sdf.iterations_expired(job.steps)
+    results, seconds = _timed(sdf.sequential_run, (agents, buffers), end)
+    return _rows([results[sink] for sink in sinks]), seconds
 
 
 def pycosimlibrary(job: Job) -> Result:
-    """A `JacobiRunner`, which keeps a snapshot at the start and after every step."""
+    """Run a `JacobiRunner`, which keeps a snapshot at the start and after every step."""
     from PyCosimLibrary.jacobi_runner import JacobiRunner
     from PyCosimLibrary.loader import FMULoader
     from PyCosimLibrary.scenario import Connection as Wire
     from PyCosimLibrary.scenario import CosimScenario, OutputConnection, SignalType, VarType
 
     loaded = {name: FMULoader.load(path, name, None) for name, path in job.fmus.items()}
-    for one in loaded.values():
-        one.fmu.instantiate()
+    for loader in loaded.values():
+        loader.fmu.instantiate()
     real = {"value_type": VarType.REAL, "signal_type": SignalType.CONTINUOUS}
 
     def end(side: str, name: str, port: str) -> dict[str, Any]:
@@ -277,7 +269,7 @@ def pycosimlibrary(job: Job) -> Result:
         return {f"{side}_fmu": loaded[name].fmu, f"{side}_vr": numbers}
 
     scenario = CosimScenario(
-        fmus=[one.fmu for one in loaded.values()],
+        fmus=[loader.fmu for loader in loaded.values()],
         connections=[
             Wire(**real, **end("source", *source), **end("target", *target))
             for source, target in job.wires
@@ -287,21 +279,20 @@ def pycosimlibrary(job: Job) -> Result:
         stop_time=job.steps * job.step,
         print_interval=job.step,
     )
-    begin = perf_counter()
-    signals = JacobiRunner().run_cosim(scenario, None).out_signals
-    seconds = perf_counter() - begin
+    result, seconds = _timed(JacobiRunner().run_cosim, scenario, None)
+    signals = result.out_signals
     columns = [signals[name][loaded[name].vars[port].valueReference] for name, port in job.wanted]
-    return [list(row) for row in zip(*columns, strict=True)][1:], seconds
+    return _rows(columns)[1:], seconds
 
 
 class Slave(NamedTuple):
-    """An FMU in initialisation mode, the same for both versions of FMI.
+    """An FMU in initialisation mode, with the same calls for both versions of FMI.
 
     Attributes:
-        numbers: value references of its variables.
-        get, set: its numbers, by value references.
+        numbers: value references by variable.
+        get, set: read or write Reals by value references.
         go: ends initialisation mode.
-        step: from a time, for a length [s].
+        step: makes a step from a time, of a length [s].
 
     """
 
@@ -313,7 +304,7 @@ class Slave(NamedTuple):
 
 
 def fmuloader(job: Job) -> Result:
-    """Its slaves: it loads FMUs, and has no master."""
+    """Step the slaves of this loader, which has no master."""
 
     def loaded(name: str, path: str) -> Slave:
         with ZipFile(path) as archive:
@@ -343,7 +334,7 @@ def fmuloader(job: Job) -> Result:
 
 
 def fmpy_slaves(job: Job) -> Result:
-    """Its slaves, of which each is an FMU with the functions of FMI."""
+    """Step fmpy's slaves, whose methods are the functions of FMI."""
     from fmpy import extract, instantiate_fmu, read_model_description
 
     def loaded(name: str, path: str) -> Slave:
@@ -364,7 +355,7 @@ def fmpy_slaves(job: Job) -> Result:
 
 
 def _by_hand(job: Job, loaded: Callable[[str, str], Slave]) -> Result:
-    """Slaves of a tool without a master, stepped side by side by a loop of ours."""
+    """Step the slaves of a tool without a master, all side by side (Jacobi)."""
     slaves = {name: loaded(name, path) for name, path in job.fmus.items()}
     values = dict.fromkeys((source for source, _ in job.wires), 0.0)
 
@@ -397,8 +388,19 @@ def _by_hand(job: Job, loaded: Callable[[str, str], Slave]) -> Result:
     return rows, perf_counter() - begin
 
 
+def _timed(run: Callable[..., Any], *arguments: Any, **options: Any) -> tuple[Any, float]:
+    """Call a function; return its result and the seconds that it took."""
+    begin = perf_counter()
+    result = run(*arguments, **options)
+    return result, perf_counter() - begin
+
+
+def _rows(columns: Sequence[Any]) -> list[list[float]]:
+    return [[float(value) for value in row] for row in zip(*columns, strict=True)]
+
+
 def write_rows(path: Path, rows: Rows, *seconds: float) -> None:
-    """Write what a host took, and its rows."""
+    """Write the seconds of a host and its rows."""
     with path.open("w", encoding="utf-8", newline="") as lines:
         csv.writer(lines).writerows([seconds, *rows])
 
@@ -406,5 +408,5 @@ def write_rows(path: Path, rows: Rows, *seconds: float) -> None:
 if __name__ == "__main__":
     run: Callable[[Job], Result] = globals()[sys.argv[1]]
     found, taken = run(Job(json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))))
-    # They keep their rows themselves: nothing is read after the steps.
+    # These tools record their rows themselves: reading takes no time.
     write_rows(Path(sys.argv[3]), found, taken, 0.0)

@@ -1,4 +1,4 @@
-"""Environments of tools: with a package made here, and with no package to be had."""
+"""Environments of hosts: with a package made here, and without a package index."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from zipfile import ZipFile
 
 import pytest
 
-from orchestrator.exchange.hosts import environments
-from orchestrator.exchange.hosts.environments import folder_of, is_whole, python_with
+from orchestrator.exchange import hosts
+from orchestrator.exchange.hosts import folder_of, is_whole, python_with
 from orchestrator.machine.errors import InputError
 
 
 @pytest.fixture(autouse=True)
 def _alone(tmp_path: Path, monkeypatch):
-    """Nothing that was made before, and no network."""
+    """Use an empty cache, and no network."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     monkeypatch.setenv("PIP_NO_INDEX", "1")
 
 
 def wheel(folder: Path) -> str:
-    """A package of one module."""
+    """Write a package with one module."""
     path = folder / "tiny-1.0-py3-none-any.whl"
     with ZipFile(path, "w") as archive:
         archive.writestr("tiny.py", "ANSWER = 42\n")
@@ -35,7 +35,7 @@ def wheel(folder: Path) -> str:
     return str(path)
 
 
-def test_environment_is_made_once_and_again_where_it_was_not_finished(monkeypatch):
+def test_environment_is_made_once_and_again_if_it_was_not_finished(monkeypatch):
     made: list[Sequence[str]] = []
 
     def run(command: Sequence[str]) -> None:
@@ -43,7 +43,7 @@ def test_environment_is_made_once_and_again_where_it_was_not_finished(monkeypatc
         if len(made) == 2:
             raise InputError("no such package")
 
-    monkeypatch.setattr(environments, "_run", run)
+    monkeypatch.setattr(hosts, "_run_command", run)
     pins = ["a==1", "b==2"]
     with pytest.raises(InputError, match="no such package"):
         python_with(pins)
@@ -68,7 +68,7 @@ def test_package_is_in_its_environment_only(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_what_cannot_be_installed_is_said(monkeypatch):
+def test_failed_installation_is_refused_with_the_reason(monkeypatch):
     with pytest.raises(InputError, match="No matching distribution found for nothing"):
         python_with(["nothing"])
     monkeypatch.delenv("PIP_NO_INDEX")

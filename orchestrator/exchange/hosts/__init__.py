@@ -1,1 +1,0 @@
-"""Hosts of others: what runs the bundle in them, and where they are installed."""
