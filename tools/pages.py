@@ -2,7 +2,7 @@
 
 `python tools/pages.py` writes each file anew that is not as it would be written; a test holds them
 against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
-`<!-- / -->`, which this replaces. The pages of the components and `docs/schemas` are written whole.
+`<!-- / -->`, which this replaces; so are the pages of the components. `docs/schemas` is written whole.
 
 `parts` has the long texts. The other tools compute what takes minutes: `page_numbers.py` prints the
 numbers of many pages, and `printed_table.py` those of docs/explanation/table.md. `pictures.py`
@@ -53,8 +53,8 @@ from parts.command_line import command_line
 from parts.examples import examples
 from parts.gallery import PICTURES, figures, gallery, picture, seen
 
-DOCS = Path(__file__).parents[1] / "docs"
-COMPONENTS = DOCS / "reference" / "components"
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 
 _PLACE = re.compile(r"(<!-- filled: (\w+) -->).*?(<!-- / -->)", re.DOTALL)
 
@@ -77,10 +77,15 @@ def files() -> dict[Path, str]:
     }
     return {
         **{DOCS / name: filled_in(DOCS / name, values) for name, values in filled.items()},
-        **{COMPONENTS / f"{name}.md": component_page(source_of(name)) for name in components()},
+        **{page_of(name): component_page(source_of(name)) for name in components()},
         DOCS / "schemas" / "scenario.json": _json(ScenarioFile),
         DOCS / "schemas" / "study.json": _json(StudyFile),
     }
+
+
+def page_of(component: str) -> Path:
+    """The page of a component."""
+    return ROOT.joinpath(*components()[component].split(".")[:-1], "page.md")
 
 
 def filled_in(page: Path, values: Mapping[str, str]) -> str:
@@ -111,7 +116,7 @@ def scenarios() -> dict[str, str]:
         f"`{kind}`" + (f" (as `{drawn[kind]}`)" if kind in drawn else "") for kind in FIGURES
     )
     fmus = (
-        (f"`{name}`", f"[{fmu}](components/{fmu}.md)") for name, fmu in wiring["components"].items()
+        (f"`{name}`", _linked(fmu, fmu, "../..")) for name, fmu in wiring["components"].items()
     )
     wires = ((f"`{target}`", f"`{source}`") for target, source in wiring["wires"].items() if source)
     return {
@@ -134,8 +139,16 @@ def mathematics() -> str:
 
 def bundle() -> str:
     """The table of docs/reference/components/README.md."""
-    rows = ((f"[`{name}`]({name}.md)", source_of(name).definition.summary) for name in components())
+    rows = (
+        (_linked(f"`{name}`", name, "../../.."), source_of(name).definition.summary)
+        for name in components()
+    )
     return _table("FMU", "what it is", rows=rows)
+
+
+def _linked(text: str, component: str, root: str) -> str:
+    """A link to the page of a component, from a folder with a relative path to the root."""
+    return f"[{text}]({root}/{page_of(component).relative_to(ROOT).as_posix()})"
 
 
 def ready() -> str:

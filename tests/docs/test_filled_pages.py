@@ -17,7 +17,7 @@ from support.markdown import DOCS, blocks
 FILES = files()
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(DOCS).as_posix())
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(DOCS.parent).as_posix())
 def test_file_is_what_the_code_says(path: Path):
     assert path.read_text(encoding="utf-8") == FILES[path], "run `python tools/pages.py`"
 

@@ -1,6 +1,6 @@
 """What the site has beside the pages of docs/: a hook of `mkdocs build`.
 
-- Pages of the repository's root, under `contributing` and `explanation`.
+- Pages of the repository's root, under `contributing` and `explanation`; those of the components.
 - The notebook as a page, with the output of its cells.
 - The live page, where npm and a compiler can make it; otherwise a page that says why it is missing.
 
@@ -25,13 +25,18 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from nbclient import NotebookClient
 
+from fmus.discovery import components
 from orchestrator.live import presets
 from orchestrator.machine.errors import InputError
 
 ROOT = Path(__file__).parents[2]
 
-#: Where the site has the pages of the root; its home is another page than the README.
+#: Where the site has pages from outside docs/; its home is another page than the README.
 PAGES = {
+    **{
+        "/".join((*module.split(".")[:-1], "page.md")): f"reference/components/{name}.md"
+        for name, module in components().items()
+    },
     "CONTRIBUTING.md": "contributing/README.md",
     "CHANGELOG.md": "contributing/changelog.md",
     "LICENSE": "contributing/licence.md",
@@ -121,8 +126,8 @@ def linked(text: str, place: str, files: Files) -> str:
         files: of the site.
 
     """
-    roots = [source for source, page in PAGES.items() if page == place]
-    folder = "" if roots else posixpath.dirname(f"docs/{place}")
+    [source] = [source for source, page in PAGES.items() if page == place] or [f"docs/{place}"]
+    folder = posixpath.dirname(source)
     here = posixpath.dirname(place) or "."
 
     def found(link: re.Match[str]) -> str:
