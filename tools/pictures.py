@@ -21,8 +21,7 @@ from orchestrator.runs.scenario import names
 from orchestrator.studies.space import Space
 from orchestrator.studies.study_file import read_figures, read_study
 from orchestrator.studies.study_result import StudyResult
-from pages import DOCS
-from parts.gallery import PICTURES
+from pages import DOCS, PICTURES
 
 #: Pictures are about 1,000 pixels wide.
 _DPI = 140

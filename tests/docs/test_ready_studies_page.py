@@ -14,7 +14,7 @@ from orchestrator.studies.study import ready_studies
 from orchestrator.studies.study_file import read_study
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
-from parts.gallery import PICTURES
+from pages import PICTURES
 from support.markdown import DOCS
 
 PAGE = DOCS / "explanation" / "ready-studies.md"

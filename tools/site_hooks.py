@@ -29,7 +29,7 @@ from fmus.discovery import components
 from orchestrator.live import presets
 from orchestrator.machine.errors import InputError
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 
 #: Where the site has pages from outside docs/; its home is another page than the README.
 PAGES = {
