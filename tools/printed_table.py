@@ -215,23 +215,15 @@ class Variants:
         allowed = np.outer(self.flags, [not ORDERS[order].against for order, _ in READINGS])
         self.consistent = np.where(allowed[:, np.newaxis, np.newaxis], self.scores, np.inf)
 
-    def arrived(self, name: str, is_consistent: bool) -> np.ndarray:
-        """Flags of the combinations that have come to the reference by T_f."""
+    def arrived(self, name: str) -> np.ndarray:
+        """Flags of consistent variants that have come to the reference by T_f."""
         arrived = (self.twelve[..., SIX[name]][..., 3:] <= REACHED).all(axis=-1)
-        return np.asarray(
-            arrived & self.flags[:, np.newaxis, np.newaxis] if is_consistent else arrived
-        )
+        return np.asarray(arrived & self.flags[:, np.newaxis, np.newaxis])
 
-    def span(self, name: str, formula: int | None) -> np.ndarray:
-        """Least and largest six of what contradicts nothing, by a formula; None: of everything."""
-        arrived = self.arrived(name, formula is not None)
-        readings = READINGS if formula is None else [(0, formula)]
-        ends = [
-            (read.min(axis=0), read.max(axis=0))
-            for reading in readings
-            for read in [as_read(self.twelve, *reading)[..., SIX[name]][arrived]]
-        ]
-        return np.array([np.min(ends, axis=0)[0], np.max(ends, axis=0)[1]])
+    def span(self, name: str, formula: int) -> np.ndarray:
+        """Least and largest six of consistent variants, by a formula."""
+        read = as_read(self.twelve, 0, formula)[..., SIX[name]][self.arrived(name)]
+        return np.array([read.min(axis=0), read.max(axis=0)])
 
     def near(self, tolerance: float) -> int:
         """The largest number of the twelve that are within a tolerance at once."""
@@ -242,7 +234,7 @@ class Variants:
         """The least distance of all six efforts at once, of what is consistent and has arrived."""
         away = np.abs(as_read(self.twelve, 0, formula) / PRINTED - 1.0)
         farthest = away[..., [0, 1, 2, 6, 7, 8]].max(axis=-1)
-        arrived = np.logical_and(*(self.arrived(name, True) for name in SCENARIOS))
+        arrived = np.logical_and(*(self.arrived(name) for name in SCENARIOS))
         return float(farthest[arrived].min())
 
 
@@ -286,7 +278,7 @@ def print_variants(crew: Workers, engine: BatchEngine, six: Variants, five: Vari
         around = held.scores[i, signal, [max(end - 10, 0), min(end + 10, 180)], reading]
         print(f"{title}: {'; '.join(words)}; T_f = {END_TIMES[end]:g} s, the score 10 s before and "
               f"after {numbers(around)}")  # fmt: skip
-    spans = np.concatenate([[six.span(n, f) for f in (0, 1, None)] for n in SCENARIOS], axis=-1)
+    spans = np.concatenate([[six.span(n, f) for f in (0, 1)] for n in SCENARIOS], axis=-1)
     rows = []
     *lines, total, factor = zip(*columns, strict=True)
     for title, printed, cells, ends in zip(TITLES, PRINTED, lines, spans.T, strict=True):
@@ -295,8 +287,8 @@ def print_variants(crew: Workers, engine: BatchEngine, six: Variants, five: Vari
             for low, high in ends.T
         ]
         rows.append([title, f"{printed:g}", *cells, *ranges])
-    rows += [["score", "", *total, "", "", ""], ["factor", "", *factor, "", "", ""]]
-    heads = ["range, L2 norm", "range, sum without the step", "range of all"]
+    rows += [["score", "", *total, "", ""], ["factor", "", *factor, "", ""]]
+    heads = ["range, L2 norm", "range, sum without the step"]
     print(f"\n{table(['', 'printed', *shown, *heads], rows)}\n")
 
 
@@ -338,6 +330,8 @@ def print_rest(six: Variants, five: Variants) -> None:
     for k, (choice, some) in enumerate({"order": ORDERS, "formula": FORMULAS}.items()):
         for i, one in enumerate(some):
             add(f"{choice} of the efforts", one, (..., [reading[k] == i for reading in READINGS]))
+    for k, row in reversed([*enumerate(rows)][1:]):
+        row[0] *= row[0] != rows[k - 1][0]
     print("\n" + table(["open", "option", "best score", "best of all", "contradicts"], rows))
 
 
