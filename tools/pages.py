@@ -17,7 +17,7 @@ import json
 import re
 import textwrap
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from math import cbrt, radians, sqrt, tan
 from pathlib import Path
@@ -122,7 +122,7 @@ def files() -> dict[Path, str]:
     filled = {
         "explanation/paper.md": paper(),
         "explanation/language.md": {"mathematics": mathematics()},
-        "gallery.md": gallery(),
+        "gallery.md": {"scenarios": gallery()},
         "reference/command-line.md": command_line(),
         "reference/components/README.md": {"components": bundle()},
         "reference/examples.md": examples(),
@@ -230,11 +230,19 @@ def _index(index: Index) -> tuple[str, str]:
 
 
 def _section(study: Study) -> str:
+    """A study in docs/explanation/ready-studies.md."""
+    settings = dict(study.parameters)
+    if study.stop_time is not None and not study.stop_time.per:
+        settings["stop_time"] = study.stop_time.base
+    stated = [study.scenario[0], *(f"{key}={value}" for key, value in settings.items())]
+    # The live page does not accept stars in names.
+    live = "" if any("*" in one for one in stated) else f" <!-- live: {'&'.join(stated)} -->"
     pictures = (
-        f"![{seen(study, figure)}](../{PICTURES}/{picture(study, figure)})"
-        for figure in figures(study)
+        f"![{seen(study, name)}](../{PICTURES}/studies/{study.name}-{name}.png)"
+        for name in study.figures
+        if name != LABELS
     )
-    command = f"`auv-fmu sweep {study.name}`"
+    command = f"`auv-fmu sweep {study.name}`{live}"
     return "\n\n".join([f"## {study.title}", command, *pictures, study.remark.strip()])
 
 
@@ -439,22 +447,11 @@ def _first_line(name: str) -> str:
     return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
 
 
-def gallery() -> dict[str, str]:
-    """Parts of docs/gallery.md: the scenarios and the studies."""
-    return {
-        "scenarios": _grid(map(_scenario, sorted(map(read_scenario, names()), key=_place))),
-        "studies": _grid(map(_study, map(read_study, ready_studies()))),
-    }
-
-
-def picture(study: Study, figure: str) -> str:
-    """File of a study's figure, relative to :data:`PICTURES`."""
-    return f"studies/{study.name}-{figure}.png"
-
-
-def figures(study: Study) -> Iterator[str]:
-    """Names of a study's figures."""
-    return (name for name in study.figures if name != LABELS)
+def gallery() -> str:
+    """The scenarios in docs/gallery.md, two in a row."""
+    cells = [*map(_scenario, sorted(map(read_scenario, names()), key=_place))]
+    pairs = zip_longest(cells[::2], cells[1::2], fillvalue="")
+    return "\n".join(["| | |", "|---|---|", *(f"| {one} | {other} |" for one, other in pairs)])
 
 
 def seen(study: Study, figure: str) -> str:
@@ -472,47 +469,22 @@ def seen(study: Study, figure: str) -> str:
         "bands": f"{words(show)} over {words(x)}",
         "maps": f"{words(show)} as colours over {words(x)} and {words(y)}",
         "front": f"{words(y)} against {words(x)}, and the runs that no other run beats in both",
-        "influence": f"how much {words(x)} move {words(show)}",
+        "influence": f"how much the values that vary move {words(show)}",
     }[declared.kind]
     only = "".join(f", {words(key)} {value}" for key, value in flatten(declared.where or {}))
     return text + only
 
 
 def _scenario(scenario: Scenario) -> str:
-    alternative = _SEEN[FLEET if scenario.vehicles else scenario.figure]
-    file = f"{PICTURES}/{scenario.name}.png"
-    return _cell(scenario.title, alternative, file, f"run {scenario.name}", scenario.name)
+    name, file = scenario.name, f"{PICTURES}/{scenario.name}.png"
+    shown = f"[![{_SEEN[FLEET if scenario.vehicles else scenario.figure]}]({file})]({file})"
+    return f"{shown}<br>**{scenario.title}**<br>`auv-fmu run {name}` <!-- live: {name} -->"
 
 
 def _place(scenario: Scenario) -> tuple[bool, bool, str]:
     """Sort key: the paper's scenarios first, and among these the open loops last."""
     name = scenario.name
     return not name.startswith("fig"), name.startswith("fig3"), name
-
-
-def _study(study: Study) -> str:
-    first = next(figures(study))
-    settings = dict(study.parameters)
-    if study.stop_time is not None and not study.stop_time.per:
-        settings["stop_time"] = study.stop_time.base
-    stated = [study.scenario[0], *(f"{key}={value}" for key, value in settings.items())]
-    # The live page does not accept stars in names.
-    preset = "" if any("*" in one for one in stated) else "&".join(stated)
-    file = f"{PICTURES}/{picture(study, first)}"
-    return _cell(study.title, seen(study, first), file, f"sweep {study.name}", preset)
-
-
-def _cell(title: str, alternative: str, file: str, command: str, preset: str) -> str:
-    live = f" <!-- live: {preset} -->" if preset else ""
-    shown = f"[![{alternative}]({file})]({file})"
-    return f"{shown}<br>**{title}**<br>`auv-fmu {command}`{live}"
-
-
-def _grid(cells: Iterable[str]) -> str:
-    """A table of pictures, two in a row."""
-    left = [*cells]
-    pairs = zip_longest(left[::2], left[1::2], fillvalue="")
-    return "\n".join(["| | |", "|---|---|", *(f"| {one} | {other} |" for one, other in pairs)])
 
 
 def main() -> None:
