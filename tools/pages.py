@@ -16,7 +16,7 @@ import ast
 import json
 import re
 import textwrap
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import zip_longest
 from math import cbrt, radians, sqrt, tan
@@ -31,7 +31,7 @@ from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import ball, theorem
 from auv_fmu.proof.gain_conditions import coupling
-from fmus.discovery import components, source_of
+from fmus.discovery import FILLED, components, source_of
 from fmus.documentation import component_page
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
 from orchestrator.commands.main import COMMANDS, parser
@@ -130,12 +130,11 @@ def files() -> dict[Path, str]:
             "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
         },
         "reference/scenario-files.md": scenarios(),
-        "how-to/studies.md": {"ready": ready()},
         "reference/study-files.md": studies(),
     }
     return {
         **{DOCS / name: filled_in(DOCS / name, values) for name, values in filled.items()},
-        **{page_of(name): component_page(source_of(name)) for name in components()},
+        **component_pages(),
         DOCS / "schemas" / "scenario.json": _json(ScenarioFile),
         DOCS / "schemas" / "study.json": _json(StudyFile),
     }
@@ -144,6 +143,30 @@ def files() -> dict[Path, str]:
 def page_of(component: str) -> Path:
     """Page of a component."""
     return ROOT.joinpath(*components()[component].split(".")[:-1], "page.md")
+
+
+def component_pages() -> dict[Path, str]:
+    """Pages of the components, on which parameters that another page has are only named."""
+    first = ("AuvPlant", "ObserverController", "Remus100")
+    pages, told = {}, dict[str, str]()
+    for name in sorted(components(), key=lambda name: (name not in first, name)):
+        lines, shared = [], defaultdict[str, list[str]](list)
+        for line in component_page(source_of(name)).splitlines():
+            # Only the rows of parameters have five cells.
+            if (
+                line.startswith("| `")
+                and line.count(" | ") == 4
+                and told.setdefault(line, name) != name
+            ):
+                shared[told[line]].append(line.split(" | ")[0].removeprefix("| "))
+                continue
+            if line == FILLED[1]:
+                for other, same in shared.items():
+                    link = _linked(other, other, "../..")
+                    lines.append(f"As in {link}, with the same start values: {', '.join(same)}.\n")
+            lines.append(line)
+        pages[page_of(name)] = "\n".join(lines) + "\n"
+    return pages
 
 
 def filled_in(page: Path, values: Mapping[str, str]) -> str:
@@ -205,12 +228,6 @@ def bundle() -> str:
 def _linked(text: str, component: str, root: str) -> str:
     """Link to the page of a component; `root` is the relative path of the repository's root."""
     return f"[{text}]({root}/{page_of(component).relative_to(ROOT).as_posix()})"
-
-
-def ready() -> str:
-    """Table in docs/how-to/studies.md."""
-    studies = ((f"`{name}`", read_study(name).title) for name in ready_studies())
-    return table(("`auv-fmu sweep`", "what it asks"), [*studies])
 
 
 def studies() -> dict[str, str]:
