@@ -5,8 +5,8 @@
 A gyroscope measures fast motion well, but the integral of its bias drifts. An accelerometer shows
 the direction of gravity, but also every acceleration of the vehicle. The filter takes changes that
 are faster than `T` seconds from the first and slower ones from the second: its two transfer
-functions, T s / (T s + 1) and 1 / (T s + 1), add up to one. See W. T. Higgins, A comparison of complementary
-and Kalman filtering, 1975.
+functions, T s / (T s + 1) and 1 / (T s + 1), add up to one. See W. T. Higgins, A comparison of
+complementary and Kalman filtering, 1975.
 
 It is a continuous filter, solved exactly for held inputs. The difference of both angles is taken
 around the circle, so that the filter may turn over.

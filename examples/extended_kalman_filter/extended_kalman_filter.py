@@ -11,9 +11,9 @@ Applications to Tracking and Navigation. The inverse of S is never computed: `so
 of the gain.
 
 The filter is sampled: its outputs belong to the current measurement. It starts from a guess and the
-standard deviation of that guess. A target at the origin has no bearing, and is refused. With the default
-values a target rests 1 km away, and the estimate goes there from 280 m off. Look at `position` and
-`range_error`.
+standard deviation of that guess. A target at the origin has no bearing, and is refused. With the
+default values a target rests 1 km away, and the estimate goes there from 280 m off. Look at
+`position` and `range_error`.
 """
 
 from __future__ import annotations

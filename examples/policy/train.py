@@ -6,7 +6,8 @@
     auv-fmu run examples/policy/policy.toml
 
 The network learns the commands of a saturated PD law in random states: a force at the control
-point, which (11) turns into tau. The law measures the velocity, which the paper's controller does not.
+point, which (11) turns into tau. The law measures the velocity, which the paper's controller does
+not.
 """
 
 from __future__ import annotations

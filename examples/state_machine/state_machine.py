@@ -8,7 +8,8 @@ button is remembered, except while the cars have red. Pedestrians may walk while
 
 A mode is a member of an `IntEnum`. As a parameter it is a text, such as `red`; as an output it is
 its number. A mode changes at the end of a communication step, so a step should be short compared
-with the times. The time by which it ends late counts towards the next mode, so errors do not add up.
+with the times. The time by which it ends late counts towards the next mode, so errors do not add
+up.
 
 With the default values the button is held, and the light repeats itself every 22 s. Look at `mode`,
 `walk` and `cycles`.
