@@ -12,7 +12,7 @@ from typing import Any, overload
 
 
 class Vector(tuple[float, ...]):
-    """A tuple of numbers whose operators are those of linear algebra."""
+    """A tuple of numbers with the operators of linear algebra."""
 
     __slots__ = ()
 
@@ -57,7 +57,7 @@ class Vector(tuple[float, ...]):
         return _vector(found) if isinstance(place, slice) else found
 
     def sum(self) -> float:
-        """Return the sum, from first to last element; that of Python 3.12 rounds differently."""
+        """Return the sum, from first to last element, as Python did before version 3.12."""
         total = 0.0
         for x in self:
             total += x
