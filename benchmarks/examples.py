@@ -1,15 +1,16 @@
-"""What a step of each example costs: `python benchmarks/examples.py`.
+"""Time of a step of each example: `python benchmarks/examples.py`.
 
 Every example is built as both kinds of FMU. A loop in C calls fmi2DoStep of one instance, and
-nothing else, with default inputs. Besides, for some examples:
+nothing else, with default inputs. For some examples, there are also:
 
 - The same model as a plain slave of PythonFMU, from `benchmarks/slaves`, as PythonFMU builds it.
 - The Reference FMU in C, if `--reference-fmus DIR` names a folder with a release, or a build, of
   github.com/modelica/Reference-FMUs: FMUs in `2.0` and `3.0`. Each communication step is as long
-  as a step of its solver, and as `h_max` of ours, so both take the same number of solver steps.
+  as a step of its solver, and as `h_max` of the example, so both take the same number of solver
+  steps.
 
-What is compared is timed in turns, in one process, and has to come to the same numbers. Printed are
-medians of processor time; ratios are taken within each turn.
+All are timed in turns, in one process, and must give the same numbers. The output has medians of
+processor time; ratios are taken within each turn.
 """
 
 from __future__ import annotations
@@ -48,14 +49,13 @@ SOLVER_STEPS = {
 OURS = {"stair": {"limit": 2_000_000_000}}
 THEIRS = {"stair": {"counter": -2_000_000_000}}
 
-#: How many more runs a native FMU is timed with: beside those in Python in each turn, and beside
-#: the Reference FMUs in turns of its own.
+#: Runs of a native FMU for each run of an FMU in Python, and in its turns with a Reference FMU.
 RUNS = 20
 
 #: Numbers in an output that is an array in the Reference FMU, and several outputs in ours.
 ARRAYS = {"y": 3}
 
-#: How near a plain slave comes to the same numbers: sums of floats differ in their order.
+#: Tolerance for a plain slave, which adds up floats in another order.
 ROUNDING = 1e-12
 
 
@@ -88,7 +88,7 @@ class Instance:
         ]
 
     def begin(self, values: Mapping[str, float]) -> None:
-        """Start anew, with some values."""
+        """Start again, with other values."""
         slave = self._slave
         slave.reset()
         if self.version == "2":
@@ -118,7 +118,7 @@ class Instance:
         return thread_time() - start
 
     def number(self, name: str) -> float:
-        """What has come out."""
+        """Values of the outputs."""
         array, _, place = name.rstrip("]").partition("[")
         one = self.variables.get(name) or self.variables[array]
         get = getattr(self._slave, f"get{one.type}")
@@ -184,7 +184,7 @@ def loops(folder: Path) -> ctypes.CDLL:
 
 
 def ratio(times: Mapping[str, Sequence[float]], slow: str, fast: str) -> float:
-    """How many times as long one takes as another, by the median of the turns."""
+    """Ratio of two times, as the median over the turns."""
     return median(x / y for x, y in zip(times[slow], times[fast], strict=True))
 
 

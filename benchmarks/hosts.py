@@ -1,10 +1,10 @@
-"""Our master beside other hosts, on any files: `python benchmarks/hosts.py FILE...`.
+"""Our master compared with other hosts, on any files: `python benchmarks/hosts.py FILE...`.
 
-An FMU runs alone, here and in `fmpy.simulate_fmu`; a system in Jacobi order, here and in libcosim
-and ecos, each of which is given all its steps in one call and records nothing, while our master
-keeps all rows. Every pair is a process of its own, in which both take turns; what comes before the
-first step is taken off. Printed are the medians of our time, of theirs, and
-of their ratios. What a host does not run, or ends the process with, has no line but a count.
+A single FMU runs here and in `fmpy.simulate_fmu`; a system in Jacobi order, here and in libcosim
+and ecos, which make all steps in one call and record nothing, while our master keeps all rows. Each
+pair runs in turns, in a separate process; the time before the first step is subtracted. The output
+has the medians of the times of both, and of their ratios. Files that a host does not run, or that
+end its process, are only counted.
 
 Without files: the FMUs and the system of this project, of the native kind.
 """
@@ -41,14 +41,13 @@ from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 
-#: Rounds, steps of a run, and the longest that the steps of one run shall take [s].
+#: Rounds, steps of a run, and the longest time of the steps of one run [s].
 ROUNDS, STEPS, LONGEST = 9, 10_000, 0.3
 
-#: Steps that the length of a run is found with, and runs of one step, the shortest of which is
-#: taken off.
+#: Steps of a trial run, and runs of one step; the shortest time of these is subtracted.
 FIRST, SET_UPS = 500, 5
 
-#: How long a pair may take [s].
+#: Time limit for a pair [s].
 PATIENCE = 60
 
 #: Makes a number of steps, and says how long they took [s].
@@ -96,7 +95,7 @@ def in_fmpy(system: System, step: float, _: Path) -> Run:
 
 
 def in_libcosim(system: System, step: float, folder: Path) -> Run:
-    """libcosim on a system in its own format: archives of others end its process."""
+    """libcosim on a system in its own format, because third-party archives end its process."""
     tool = measuring.libcosim()
     write_osp(replace(system, step=step), folder)
 
@@ -125,7 +124,7 @@ def in_ecos(system: System, step: float, folder: Path) -> Run:
     return run
 
 
-#: Hosts by the ends of the names of what they run.
+#: Hosts by the suffixes of their files.
 HOSTS = {
     ".fmu": {"fmpy": in_fmpy},
     ".ssp": {"libcosim": in_libcosim, "ecos": in_ecos},

@@ -1,11 +1,11 @@
-"""What FMUs leave behind: `python benchmarks/leaks.py [N] [--only WORD]`.
+"""Memory that FMUs leak: `python benchmarks/leaks.py [N] [--only WORD]`.
 
 Makes an instance, initialises and steps it, saves, serialises and restores its state, resets and
 frees it, N times, 10,000 if no number is given. Prints the resident memory after a tenth of the
-cycles and after all of them, and what a cycle between them left behind.
+cycles and after all of them, and the memory that each cycle between them leaked.
 
-Measures every FMU in a Python host and in a C host, built with both loaders, and an FMU with one
-variable as PythonFMU alone builds it: what that one leaves behind is PythonFMU's share.
+Measures every FMU in a Python host and in a C host, built with both loaders, and a plain FMU of
+PythonFMU with one variable, which shows the leaks of PythonFMU itself.
 """
 
 from __future__ import annotations
@@ -125,7 +125,7 @@ def main() -> None:
 
 
 def outcome(command: list[str]) -> str:
-    """What a host printed, as the cells of a row; FMUs without the loader need Python preloaded."""
+    """Output of a host as the cells of a row; FMUs without the loader need Python preloaded."""
     environment = {**os.environ, "LD_PRELOAD": str(_LIBPYTHON)}
     process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     readings = [[int(word) for word in line.split()] for line in process.stdout.splitlines()]

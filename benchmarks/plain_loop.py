@@ -1,11 +1,11 @@
-"""What a step of Fig. 4 costs in C written by hand: `python benchmarks/plain_loop.py`.
+"""Time of a step of Fig. 4 in C written by hand: `python benchmarks/plain_loop.py`.
 
-`plain_loop.c` is the loop and nothing else, for the least that a program of it takes. It is built
-in several ways and compared with the batch engine, which makes all indices too. All make the same
-run without noise, in turn, again and again. Of each the shortest processor's time counts, less the
-shortest of a run of one step, and its ratio to that of the fastest build.
+`plain_loop.c` is only the loop, the fastest program for it. It is built in several ways and
+compared with the batch engine, which also computes all indices. All make the same run without
+noise, in turns. Each row has the shortest processor time, less the time of a run of one step, and its
+ratio to the fastest build.
 
-Without another option zig compiles for the processor that it runs on.
+By default zig compiles for the processor that it runs on.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _BUILDS = {
 
 
 class State(ctypes.Structure):
-    """What the program ends with, in its order."""
+    """Final values of the program, in order."""
 
     _fields_ = (
         ("position", 3 * ctypes.c_double),
@@ -105,7 +105,7 @@ def step_times(
     once, whole = dict.fromkeys(rows, inf), dict.fromkeys(rows, inf)
     for _ in range(repetitions):
         for name, make in rows.items():
-            make(1)  # what the others have left in the processor's caches is not its own
+            make(1)  # warm the caches of the processor
             once[name] = min(once[name], timed(partial(make, 1), process_time))
             whole[name] = min(whole[name], timed(partial(make, steps + 1), process_time))
     return {name: 1e6 * (whole[name] - once[name]) / steps for name in rows}

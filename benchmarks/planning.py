@@ -1,13 +1,13 @@
-"""What a large system costs before its first step: `python benchmarks/planning.py`.
+"""Cost of a large system before its first step: `python benchmarks/planning.py`.
 
-Chains, stars, and neighbours that feed one another, of one small FMU in C that does not say what
-its outputs depend on. Ours is the default order, which has to be found; libcosim and ecos step all
-at once. Every run is a process of its own, which is ended after a stated time. Printed are
+Chains, stars, and neighbours that feed one another, of one small FMU in C that does not declare the
+dependencies of its outputs. Our master steps in its default order; libcosim and ecos step all at
+once. Every run is a separate process with a time limit. The columns are
 
-- `load`: from the file to what can be run,
+- `load`: reading of the file,
 - `start`: plan, instances, initialisation and first exchange of values,
-- `10 steps`: these; libcosim starts in its first step, of which what the others take is taken off,
-- `memory`: the most that the process has had.
+- `10 steps`: ten steps; libcosim starts in its first step, whose excess time is subtracted,
+- `memory`: largest memory of the process.
 """
 
 from __future__ import annotations
@@ -206,7 +206,7 @@ HOSTS: dict[str, Callable[[Path], tuple[float, float, float]]] = {
 
 
 def measured(host: str, folder: Path, limit: float) -> str:
-    """What a process finds that makes one run, as the end of a line of the table."""
+    """Results of a process that makes one run, as the end of a line of the table."""
     try:
         *times, memory = measuring.found_apart(__file__, host, folder, limit=limit)
     except RuntimeError as error:

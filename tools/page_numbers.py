@@ -83,7 +83,7 @@ QUIET: Values = {STD: 0.0}
 
 
 def system_of(name: str) -> System:
-    """The system of a scenario, or of the PD controller beside it: `path-pd` is that of `path`."""
+    """System of a scenario, or of its PD controller: `path-pd` belongs to `path`."""
     if name in names():
         return load_scenario(name)[1]
     request = Request(name.removesuffix("-pd"))
@@ -141,7 +141,7 @@ def show(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     print(f"\n{table(head, rows)}", flush=True)
 
 
-# What the step does to the scenarios
+# Effect of the step on the scenarios
 
 #: Scenarios; the path of one depends on the last bits of its start, so its numbers are bands.
 SCENARIOS = ("fig4", "fig5", "fig5-pd", "fig6", "fig6-pd", "fig7a", "fig7b", "fig7c")
@@ -165,7 +165,7 @@ INDICES = {
     for part in parts
 }  # fmt: skip
 
-#: What changes by a larger share depends on the step.
+#: An index that changes by a larger share depends on the step.
 MUCH = 0.05
 
 
@@ -364,7 +364,7 @@ def between(values: Sequence[float] | np.ndarray) -> str:
     return " to ".join(dict.fromkeys(number(end) for end in (min(values), max(values))))
 
 
-# What 1 mm of noise does
+# Effect of 1 mm of noise
 
 #: Draws of a run; of a long one; of one with events, which the FMUs make.
 MANY, SOME, FEW = 1000, 30, 100
@@ -462,7 +462,7 @@ def fault_measures(made: Table) -> dict[str, float]:
     }
 
 
-# What random seas, links and noise do
+# Effect of random seas, links and noise
 
 #: Over which times the largest errors count [s].
 SPANS: Mapping[str, Sequence[tuple[float, float]]] = {
@@ -549,7 +549,7 @@ def ell(value: float) -> dict[str, Any]:
     return {**known, "plant.eta0.x": -value}
 
 
-#: What is changed, as the page calls it.
+#: Changes, in the words of the page.
 CHANGES: Mapping[str, Values] = {
     "nothing": {},
     "current of 0.3 m/s across the first leg": {"plant.current.y": 0.3},
@@ -663,7 +663,7 @@ def prestero_turn(speed: float) -> tuple[float, float, float]:
 
 # Networks
 
-#: Neurons of the layers, of which the first are inputs; seeds of a shape, and inputs of each.
+#: Neurons of the layers (the first are inputs); seeds of a shape, and inputs of each.
 SHAPES = ((4, 8, 2), (1, 300, 1), (3, 300, 2), (12, 64, 64, 6), (16, 200, 200, 4))
 NETWORKS, INPUTS = 20, 10
 FUNCTIONS: dict[str, Callable[[Any], Any]] = {"Tanh": np.tanh, "Relu": lambda z: np.maximum(z, 0.0)}
@@ -761,7 +761,7 @@ def gains(n: int = 1) -> None:
 
 # Studies
 
-#: What column names begin with that tells nothing apart.
+#: Prefixes of column names that do not distinguish columns.
 COMPONENT = re.compile(r"^(auv\*\.)?(plant|controller|disturbance|link)\.")
 
 
@@ -816,14 +816,14 @@ def lines_of(study: str) -> list[str]:
 
 
 def parsed(line: str) -> tuple[str, list[str], list[str], str]:
-    """The statistic of a line, its columns, what tells groups apart, and the query."""
+    """Statistic of a line, its columns, the columns that group it, and the query."""
     what, _, where = line.partition(" | ")
     columns, by = (part.split() for part in what.partition(" by ")[::2])
     return columns[0], columns[1:] or ["run"], by, where
 
 
 def prepared(study: str, runs: Any) -> Any:
-    """The runs with short names, and with the columns that are made of others."""
+    """Runs with short names, and with computed columns."""
     runs = runs.rename(columns=lambda name: COMPONENT.sub("", name))
     runs = runs.rename(columns=lambda name: re.sub(r"\W+", "_", name).strip("_"))
     runs = runs.rename(columns={"lambda": "lam"})
@@ -831,7 +831,7 @@ def prepared(study: str, runs: Any) -> Any:
         runs["proposed"], runs["PD"] = runs.scenario == "fig5", runs.scenario == "fig5-pd"
     runs["failed"] = runs.failure.fillna("") != ""
     runs["ended"] = runs.failure.str.extract(r" t = (\S+) s", expand=False).astype(float)
-    # Of several vehicles, the largest.
+    # The largest of several vehicles.
     runs["late_error"] = runs.filter(regex="(^|_)late_error$").max(axis=1)
     runs["lost"] = ~(runs.late_error <= 1.0)
     runs["saturated"] = runs.filter(like="saturated_fraction").max(axis=1) > 0.0
@@ -844,7 +844,7 @@ def prepared(study: str, runs: Any) -> Any:
         first = runs.groupby(["step", "noise_std", "way"]).l2_effort_u.transform("first")
         runs["effort_ratio"] = runs.l2_effort_u / first
     for amplitude, other in (("A_f", "A_d"), ("A_d", "A_f")) if study == "robustness" else ():
-        # Whether it is kept with this disturbance, and with all weaker ones on the line.
+        # True if the reference is kept with this disturbance and all weaker ones on the line.
         line = runs.sort_values(amplitude).groupby(
             ["scenario", "step", "noise_std", "omega_d", other]
         )
@@ -922,7 +922,7 @@ def machine() -> str:
     return f"{processor}, {os.cpu_count()} cores{load}"
 
 
-#: What there is, by name.
+#: Functions by name.
 PAGES: Mapping[str, Callable[..., int | None]] = {
     one.__name__: one
     for one in (accuracy, noise, seeds, remus, networks, gains, studies, benchmarks)

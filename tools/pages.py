@@ -59,7 +59,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 EXAMPLES = ROOT / "examples"
 
-#: Folder of the pictures of scenarios, in docs/, with those of studies below it.
+#: Folder of the pictures in docs/; pictures of studies are in its subfolder `studies`.
 PICTURES = "images"
 
 _PLACE = re.compile(r"(<!-- filled: (\w+) -->).*?(<!-- / -->)", re.DOTALL)

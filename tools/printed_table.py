@@ -51,7 +51,7 @@ END_TIMES = np.arange(20.0, 201.0)
 #: Starts, moved by at most 1e-6 m, by which variants of five degrees of freedom are compared, and
 #: others that are shown, with these quantiles; and a band that is narrower, relatively, is not.
 SEARCHED, SHOWN, QUANTILES, MOVED, SAME = range(31), range(31, 131), (0.1, 0.5, 0.9), 1e-6, 0.01
-#: How near counts as near, in parts of a printed number.
+#: Tolerances, relative to a printed number.
 TOLERANCES = (0.1, 0.25, 0.5)
 
 
@@ -59,7 +59,7 @@ class Option(NamedTuple):
     """One way to fill in what the paper leaves open, and what is printed that it contradicts."""
 
     text: str
-    parameters: Mapping[str, Any] = {}  # nobody changes it
+    parameters: Mapping[str, Any] = {}  # never changed
     against: str = ""
     order: OrderName | None = None
 
@@ -231,7 +231,7 @@ class Variants:
         return max(int((one <= tolerance).sum(axis=-1).max()) for one in away)
 
     def efforts_within(self, formula: int) -> float:
-        """The least distance of all six efforts at once, of what is consistent and has arrived."""
+        """Least distance of all six efforts at once, over consistent variants that have arrived."""
         away = np.abs(as_read(self.twelve, 0, formula) / PRINTED - 1.0)
         farthest = away[..., [0, 1, 2, 6, 7, 8]].max(axis=-1)
         arrived = np.logical_and(*(self.arrived(name) for name in SCENARIOS))

@@ -46,22 +46,22 @@ WORDS = Path(__file__).with_suffix(".toml")
 CODE = ("benchmarks", "examples", "fmus", "orchestrator", "src", "tests", "tools")
 PRODUCT = ("fmus", "orchestrator", "src")
 
-#: How many words the sentences of a page have at most, on average.
+#: Largest average number of words in the sentences of a page.
 LIMIT = 20
 
-#: What proselint does not check: marks that Markdown has in ASCII, numbers that are no dates, and
-#: what the file of words has too.
+#: Checks of proselint that are off: about ASCII marks, which Markdown needs, about dates, which it
+#: sees in other numbers, and about words of our own list.
 _OFF = ("annotations", "dates_times", "typography", "weasel_words")
 
-#: What stands for code within a sentence.
+#: Stands for code within a sentence.
 _CODE = "`…`"
 
-#: What keeps blocks apart where they are read as one text: no rule passes over it.
+#: Separates blocks that are checked as one text: no rule matches across it.
 _BETWEEN = "\n\n¶\n\n"
 
 _MARKDOWN = MarkdownIt("commonmark").enable("table")
 
-#: Where sentences end, the end of an item that is one, and what has a full stop within one.
+#: Ends of sentences, the end of an item that is one, and abbreviations with a full stop.
 _END = re.compile(
     r"""[.!?]["')\]]*\s+(?=["'(\[]*(?:[A-Z0-9`§λγστε]|ecos|fmpy|libcosim|pip|theta_hat))"""
 )
@@ -71,7 +71,7 @@ _ABBREVIATION = re.compile(
 )
 
 
-#: What a docstring holds that is no prose: code in backquotes, and examples.
+#: Parts of a docstring that are not prose: code in backquotes, and examples.
 _INLINE = re.compile(
     r"(?::\w+:)?``?[^`]+``?(?:__?)?|^ *>>> .*$|^( +)\.\. math::.*\n(?:\1 +.*\n|\n)*", re.M
 )
@@ -93,11 +93,11 @@ class Block(NamedTuple):
 
     line: int
     text: str
-    #: Whether its sentences are counted.
+    #: True if its sentences are counted.
     is_prose: bool
-    #: Whether it describes a piece of code.
+    #: True if it describes code.
     is_inside: bool = False
-    #: Whether it is a value in code, which may be shown to a user.
+    #: True for a value in code, which may be shown to a user.
     is_message: bool = False
 
 
@@ -114,11 +114,11 @@ class Rule(NamedTuple):
     find: re.Pattern[str]
     write: str
     unless: re.Pattern[str] | None
-    #: Whether they are avoided as the first words of docstrings and comments only.
+    #: True if the words are avoided only at the beginning of docstrings and comments.
     opens: bool
 
     def spans(self, text: str) -> Iterator[tuple[int, int]]:
-        """Where a text has the words: from, to."""
+        """Places of the words in a text: from, to."""
         right = list(self.unless.finditer(text)) if self.unless else []
         for match in self.find.finditer(text):
             if not any(other.start() <= match.start() < other.end() for other in right):
@@ -239,7 +239,7 @@ def markdown_blocks(text: str) -> Iterator[Block]:
 
 
 def spoken(tokens: Sequence[Token]) -> str:
-    """What a reader reads of a text."""
+    """Readable part of a text."""
     instead = {"code_inline": _CODE, "softbreak": "\n", "hardbreak": "\n"}
     parts = (instead.get(t.type, t.content if t.type == "text" else "") for t in tokens)
     return "".join(parts)
@@ -256,7 +256,7 @@ def sentences(text: str) -> Iterator[str]:
 
 
 def length(sentence: str) -> int:
-    """How many words a sentence has."""
+    """Number of words in a sentence."""
     return sum(word.startswith(_CODE) or any(map(str.isalnum, word)) for word in sentence.split())
 
 
@@ -298,7 +298,7 @@ def findings(page: Page) -> Iterator[str]:
 
 
 def library_findings(text: str) -> Iterator[tuple[int, int, str]]:
-    """Where proselint finds something in a text, from and to, and what it says."""
+    """Findings of proselint in a text: from, to, and the message."""
     registry = CheckRegistry()
     if not registry.checks:
         registry.register_many(library_checks)
@@ -320,7 +320,7 @@ def quotation(text: str, begin: int, end: int) -> str:
     return " ".join(f"{before.group()}{text[begin:end]}{after.group()}".split())
 
 
-#: How a kind of file is read, and folders in which nothing is read.
+#: Readers by kind of file, and folders that are skipped.
 READERS = {
     ".md": markdown_blocks,
     ".ipynb": notebook_blocks,

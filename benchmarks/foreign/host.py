@@ -1,4 +1,4 @@
-"""A host of one FMU that shares nothing with the master: what it is held against.
+"""A host of one FMU that shares no code with the master, for comparison.
 
 As plain as FMI allows: ctypes, a fixed step, t_k = k h, every Real output read after every step.
 `python host.py FMU RUN OUT`, where RUN is what `ours.py` has written about the same run.

@@ -1,4 +1,4 @@
-"""libcosim and ecos, which run systems of others: `python other_masters.py TOOL FILE SYSTEM OUT`.
+"""libcosim and ecos on third-party systems: `python other_masters.py TOOL FILE SYSTEM OUT`.
 
 SYSTEM is what `ours.py` has written about the same run; OUT is where the rows go.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from orchestrator import load
 from orchestrator.cosim import write_osp
 
-#: Where the name of a parameter set stands.
+#: Attribute with the name of a parameter set.
 _PARAMETER_SET = re.compile(r"ParameterSet\b[^>]*\bname=\"([^\"]*)\"")
 
 #: A Real output: component, port, value reference.

@@ -1,7 +1,7 @@
-"""The master under test, in a process of its own: what it makes of an FMU or an archive.
+"""Our master on an FMU or an archive, in a separate process.
 
-`python ours.py FILE STEPS OUT [--order jacobi] [--changed]` writes what came of it to OUT, and the
-rows of all outputs beside it.
+`python ours.py FILE STEPS OUT [--order jacobi] [--changed]` writes the result to OUT, and the rows
+of all outputs next to it.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from orchestrator.cosim import Component, System, Value, Variable, read_componen
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import DEFAULT_STEP
 
-#: Name of the component that an FMU is alone.
+#: Name of the component of a single FMU.
 ALONE = "fmu"
 
-#: By how much a Real parameter is changed: of its start value, or from zero.
+#: Change of a Real parameter, relative to its start value, or from zero.
 _CHANGE = 0.01
 
 
 def system_of(file: Path) -> System:
-    """The system that a file holds."""
+    """System in a file."""
     if file.suffix != ".fmu":
         return load(file)
     return System(file.stem, {ALONE: read_component(ALONE, file)}, ())

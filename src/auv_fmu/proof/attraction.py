@@ -23,7 +23,7 @@ from auv_fmu.proof.gain_conditions import (
 
 
 class Alphas(NamedTuple):
-    """Upper bounds of alpha_1 to alpha_4 of (40) [W]; the first two are exact."""
+    """Upper bounds of alpha_1 to alpha_4 in (40), the bound on (37) [W]; two are exact."""
 
     alpha_1: float
     alpha_2: float
