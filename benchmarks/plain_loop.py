@@ -2,8 +2,8 @@
 
 `plain_loop.c` is only the loop, the fastest program for it. It is built in several ways and
 compared with the batch engine, which also computes all indices. All make the same run without
-noise, in turns. Each row has the shortest processor time, less the time of a run of one step, and its
-ratio to the fastest build.
+noise, in turns. Each row has the shortest processor time, less the time of a run of one step, and
+its ratio to the fastest build.
 
 By default zig compiles for the processor that it runs on.
 """

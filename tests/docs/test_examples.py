@@ -61,7 +61,7 @@ needs_studies = needs("studies", "pyarrow", "scipy")
 
 
 def executed(page: Path, capsys: pytest.CaptureFixture[str], number: int = 0) -> list[str]:
-    """What an example in Python prints."""
+    """Output of an example in Python."""
     exec(compile(blocks(page, "python")[number].text, str(page), "exec"), {})
     return str(capsys.readouterr().out).splitlines()
 
@@ -88,7 +88,7 @@ def test_scenario_of_a_guide_runs_and_is_drawn(page: Path, number: int):
 
 
 @pytest.mark.parametrize("name", ["fault-thruster", "fault-sensor", "current-step"])
-def test_what_a_scenario_says_stands_on_the_page(name):
+def test_remarks_of_scenarios_are_on_the_page(name):
     text = " ".join(EVENTS.read_text(encoding="utf-8").split())
     assert " ".join(read_scenario(name).remark.split()) in text
 
@@ -251,7 +251,7 @@ def test_effort_of_the_pd_controller_belongs_to_the_plants_scheme_as_the_page_sa
 
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
-def test_a_trajectory_of_ones_own_is_that_of_its_table(capsys: pytest.CaptureFixture[str]):
+def test_a_users_trajectory_follows_its_table(capsys: pytest.CaptureFixture[str]):
     """Between the rows it is the curve that the rows are on, whose derivatives are known."""
     executed(TRAJECTORIES, capsys)
     Path("table_planner.py").write_text(blocks(TRAJECTORIES, "python")[1].text)

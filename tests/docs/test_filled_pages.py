@@ -1,4 +1,4 @@
-"""What tools/pages.py writes is what is committed."""
+"""The committed files are the output of tools/pages.py."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def validator(kind: str) -> Draft202012Validator:
 
 
 def ready(kind: str) -> list[str]:
-    """The files that come with the program, and those of the page."""
+    """Files that come with the program, and files on the page."""
     folder = {"scenario": runs.SCENARIOS_FOLDER, "study": study.STUDIES_FOLDER}[kind]
     page = DOCS / {"scenario": "reference/scenario-files.md", "study": "how-to/studies.md"}[kind]
     files = [file.read_text(encoding="utf-8") for file in folder.glob("*.toml")]

@@ -120,7 +120,7 @@ def test_both_kinds_give_the_same_table(followed: tuple[Path, str]):
 
 
 def test_other_hosts_give_the_same_numbers(followed: tuple[Path, str]):
-    """fmpy here; those of the page say how far they are off."""
+    """In fmpy; the table on the page has the deviations of other hosts."""
     folder, said = followed
     rows = [
         fmpy.simulate_fmu(

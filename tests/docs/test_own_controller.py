@@ -102,7 +102,7 @@ def test_both_forms_give_the_same_motion(workplace: Path):
     ],
 )
 def test_law_to_begin_with_arrives_from_elsewhere(workplace: Path, settings: dict[str, float]):
-    """Also with a sensor a hundred times as bad, and if it is told nothing of the vehicle."""
+    """Also with a sensor a hundred times as bad, and without parameters of the vehicle."""
     new_controller("my_law", Path())
     result = simulate("my_law.toml", settings)
     assert max(result.metrics()["final_error"]) < 0.08
@@ -168,7 +168,7 @@ def built_with(old: str, new: str) -> int:
     return (before + new).count("\n")
 
 
-def test_mistake_in_the_first_step_is_all_that_is_told(workplace, capsys):
+def test_mistake_in_the_first_step_is_the_only_message(workplace, capsys):
     """No figures and no indices of a run that has made no step."""
     line = built_with("        value = self.values\n", "        value = self.valu\n")
     capsys.readouterr()
@@ -185,7 +185,7 @@ def test_mistake_in_the_first_step_is_all_that_is_told(workplace, capsys):
     [("get()", "if self.filtered: nothing", 1), ("put(value)", "nothing", 2)],
 )
 def test_mistake_in_a_value_is_told_with_its_line(workplace, capsys, head, mistake, status):
-    """Where a plain slave gives or takes a value; PythonFMU alone ends with fmi2Fatal."""
+    """While a plain slave gets or sets a value, where plain PythonFMU ends with fmi2Fatal."""
     head = f"        def {head}:\n"
     line = built_with(head, f"{head}            {mistake}\n")
     capsys.readouterr()
@@ -196,7 +196,7 @@ def test_mistake_in_a_value_is_told_with_its_line(workplace, capsys, head, mista
 
 
 def test_changed_script_runs_changed_in_the_same_process(workplace):
-    """Modules beside the script are in the FMU, and those of two versions do not meet."""
+    """Modules in the folder of the script are in the FMU; two versions of one do not meet."""
     assert main(["new", "controller", "two_versions", ".", "--python"]) == 0
     script = Path("two_versions.py")
     text = script.read_text().replace(
@@ -213,7 +213,7 @@ def test_changed_script_runs_changed_in_the_same_process(workplace):
 
 @pytest.mark.slow
 def test_many_instances_of_a_plain_slave_in_one_process(workplace):
-    """PythonFMU alone crashes the process after some dozens."""
+    """A plain FMU of PythonFMU crashes the process after some dozens."""
     assert main(["new", "controller", "Often", ".", "--python"]) == 0
     code = (
         "from orchestrator import simulate\n"

@@ -1,4 +1,4 @@
-"""What is wrong in the paper: the page is in the report, its numbers hold, and tests show it."""
+"""Errors of the paper: the page is in the report, its numbers hold, and tests show each point."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_the_report_has_the_page_without_its_marks_and_without_links_out_of_it()
 
 
 def test_v_rises_from_zero():
-    """Of Fig. 4 on its reference, without noise: V but for its last term, which is not negative.
+    """V of Fig. 4 without noise, on its reference, without the last term, which is not negative.
 
     With theta_0 = theta the last term is zero at first, whatever theta is.
     """
@@ -169,7 +169,7 @@ def test_surge_efforts_cannot_be_smaller():
         assert least[-1] <= np.sqrt(square)
     assert tells(text, [f"{effort:.0f}" for effort in least])
     assert least[0] > EFFORT_PROPOSED[0] and least[1] > EFFORT_PD[0]
-    # Where the bound of the sum, least / sqrt(h T_f), is what is printed.
+    # T_f at which the bound of the sum, least / sqrt(h T_f), equals the printed number.
     free = np.square(np.divide(least, (EFFORT_PROPOSED[0], EFFORT_PD[0]))) / PAPER.h
     assert tells(text, [f"{duration:.0f}" for duration in free])
 

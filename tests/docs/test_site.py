@@ -29,7 +29,7 @@ LIVE = "live.html"
 HERE = Path(__file__).parent
 QUESTIONS = tomllib.loads((HERE / "questions.toml").read_text(encoding="utf-8"))
 
-#: Of how many pages, as the search lists them, one has the answer.
+#: Number of pages at the top of the search among which the answer is.
 FIRST = 5
 
 

@@ -140,7 +140,7 @@ def acceleration(theta, psi, nu, tau, tau_w):
     tau=vectors(forces, 3),
     tau_w=vectors(forces, 5),
 )
-def test_equation_15_holds_with_what_d_lacks(theta, psi, nu, tau, tau_w):
+def test_equation_15_holds_with_the_missing_term_of_d(theta, psi, nu, tau, tau_w):
     u, v, w, q, r = nu
     at, unactuated = (VEHICLE, theta, psi), np.array([v, w])
     in_body = (u, v, w, 0.0, q, r)
@@ -340,7 +340,7 @@ def test_p2_5_fails_for_an_unbounded_velocity(speed):
     x_2=vectors(speeds, 3),
 )
 def test_p2_5_holds_for_a_bounded_second_velocity(theta, psi, w, x_1, x_2):
-    """Which is all that (26) and (29) need: x_2 = dy_r there, and |dy_r| is bounded by (16).
+    """(26) and (29) need no more: x_2 = dy_r there, and |dy_r| is bounded by (16).
 
     d = L(w) dy + Q(dy) with a quadratic Q, |Q(h)| <= k |h|^2 / 2: so the change of d is
     L(w) h + DQ(x_2) h + Q(h), within (|L(w)| + k |x_2|) |h| + k |h|^2 / 2.
@@ -386,12 +386,12 @@ three = vectors(speeds, 3)
     force=vectors(forces, 3),
     tau_w2=vectors(forces, 3),
 )
-def test_error_dynamics_are_those_of_15_but_for_p2_3(
+def test_error_dynamics_follow_from_15_except_for_p2_3(
     theta, psi, w, dy_r, ddy_r, r_1, r_2, force, tau_w2
 ):
-    """M_2 dr_1/dt of (15) is that of (20); that less k_d M_2 r_2 is (28).
+    """M_2 dr_1/dt of (15) equals (20); less k_d M_2 r_2 it is (28).
 
-    Each is so but for C_2(x_1) x_2 - C_2(x_2) x_1, which P2.3 takes to be zero.
+    Both hold except for C_2(x_1) x_2 - C_2(x_2) x_1, which P2.3 takes to be zero.
     """
     at = (VEHICLE, theta, psi)
     w, dy_r, ddy_r, r_1, r_2, force, tau_w2 = map(
@@ -449,7 +449,7 @@ def test_15_needs_one_more_term():
         )
 
     def vanishes(x):
-        """Whether all entries are zero; r / cos(theta) is their only quotient."""
+        """True if all entries are zero; r / cos(theta) is their only quotient."""
         plain = dict(zip((c_theta, s_theta, c_psi, s_psi), sp.symbols("a b c d"), strict=True))
         a, b, c, d = plain.values()
         for entry in x:

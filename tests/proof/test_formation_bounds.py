@@ -97,7 +97,7 @@ def test_constant_age_is_stable_below_the_sum_of_both_times(lambda_, k_d, age):
 
 @given(st.floats(0.2, 2.0), st.floats(0.2, 2.0), st.floats(0.2, 6.0), st.floats(0.0, 3.0))
 @settings(max_examples=30)
-def test_stability_with_a_period_is_that_of_the_scheme(lambda_, k_d, period, delay):
+def test_stability_with_a_period_agrees_with_the_scheme(lambda_, k_d, period, delay):
     """Eigenvalues of the map over a period, found by steps of Euler's scheme from small errors."""
     n = 2000
     h, columns = period / n, []

@@ -95,7 +95,7 @@ def test_ours_is_what_the_scenarios_give_and_the_page_shows(variants):
     assert f"\n| score |  | {variants.scores[0, 0, T_F[100.0], 0]:.2f} | " in page
 
 
-def test_options_are_those_of_the_runs(variants):
+def test_options_have_the_numbers_of_runs(variants):
     """Jacobi order, eps_t = 1, as sums without the step at 57 s; for PD eps_t stays 10."""
     [i] = [
         i
