@@ -49,8 +49,7 @@ _HEAD = """\
 
 Which public FMUs and SSP archives run in auv-fmu. `python benchmarks/foreign FOLDER` writes this
 page and [tested-fmus.csv](tested-fmus.csv), which says of every file that does not run why, and of
-every archive what its run reported. It clones public repositories at named commits, and runs each
-file in a process of its own; files with the same bytes count once.
+every archive what its run reported. Files with the same bytes count once.
 
 - **Archives** run unchanged, in the default order, for {steps} steps or to the end that they name.
   They are compared in Jacobi order with {tools}.
