@@ -50,7 +50,7 @@ def engines(names: Sequence[str]) -> tuple[FmuEngine, BatchEngine]:
 
 
 def processor(function: Callable[[], object]) -> float:
-    """Processor's seconds of one call."""
+    """Processor time of one call [s]."""
     return timed(function, process_time)
 
 

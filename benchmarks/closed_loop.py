@@ -44,7 +44,7 @@ Calls = list[Callable[[], int]]
 
 
 def slave_classes() -> list[type[Component]]:
-    """The classes of the FMUs that are loaded into this process, where `settle` has put them."""
+    """Slave classes of the FMUs in this process, where `settle` has stored them."""
     return [vars(module)[""] for module in list(sys.modules.values()) if "" in vars(module)]
 
 

@@ -23,7 +23,7 @@ CASES = {
 
 
 def cost(events: list[dict[str, object]], steps: int) -> float:
-    """Seconds a step."""
+    """Time of a step [s]."""
     begin = process_time()
     simulate("fig4", stop_time=steps * STEP, kind="native", loop="compiled", events=events)
     return (process_time() - begin) / steps

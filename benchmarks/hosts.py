@@ -50,7 +50,7 @@ FIRST, SET_UPS = 500, 5
 #: Time limit for a pair [s].
 PATIENCE = 60
 
-#: Makes a number of steps, and says how long they took [s].
+#: Makes a number of steps, and returns their time [s].
 Run = Callable[[int], float]
 
 
@@ -110,7 +110,7 @@ def in_libcosim(system: System, step: float, folder: Path) -> Run:
 
 
 def in_ecos(system: System, step: float, folder: Path) -> Run:
-    """ecos on a system as we write it."""
+    """ecos on our SSP of a system."""
     tool = measuring.ecos()
     [ssp] = write_ssp(replace(system, step=step), folder)
 
@@ -132,7 +132,7 @@ HOSTS = {
 
 
 def pair(path: Path, host: str, folder: Path) -> None:
-    """Time a file here and in another host, in turns, and tell both a step [s]."""
+    """Time a file here and in another host, in turns, and print both times of a step [s]."""
     alone = path.suffix == ".fmu"
     system = System(path.stem, {"a": read_component("a", path)}, ()) if alone else read_ssp(path)
     here, step = ours(system, "jacobi")

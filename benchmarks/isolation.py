@@ -20,7 +20,7 @@ from orchestrator.runs.wiring import closed_loop
 
 
 def start_time(system: System, order: str) -> float:
-    """Seconds of a run of one step, each FMU in a process of its own."""
+    """Seconds of a run of one step, with a process for each FMU."""
     plan = make_plan(system, Experiment(STEP, STEP, order))
     return timed(lambda: simulate_plan(plan, [Table()], Isolation()))
 

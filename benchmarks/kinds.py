@@ -44,7 +44,7 @@ Engine = Callable[[int], float]
 
 
 class Pair(NamedTuple):
-    """Two engines whose ratio is printed."""
+    """Two engines, to print their ratio."""
 
     fast: str
     slow: str

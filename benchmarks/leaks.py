@@ -52,7 +52,7 @@ class Bare(Fmi2Slave):
 
 
 def bare(folder: Path) -> Path:
-    """An FMU as PythonFMU builds it."""
+    """A plain FMU of PythonFMU."""
     script = folder / "bare.py"
     script.write_text(_BARE, encoding="utf-8")
     options = {"handle-state": True, "serialize-state": True}
@@ -60,7 +60,7 @@ def bare(folder: Path) -> Path:
 
 
 def cycle(folder: Path) -> None:
-    """One life of an instance, in a Python host."""
+    """One cycle of an instance in a Python host."""
     fmu = FMU2Slave(guid="", modelIdentifier=identifier(folder), unzipDirectory=str(folder))
     fmu.instantiate()
     fmu.setupExperiment()
@@ -83,7 +83,7 @@ def identifier(folder: Path) -> str:
 
 
 def be_host(folder: Path, counts: list[int]) -> None:
-    """Do and print what the C host does and prints."""
+    """Run cycles in Python, and print the same as the C host."""
     done = 0
     for count in counts:
         for _ in range(count - done):

@@ -48,7 +48,7 @@ class Parts:
     """A hook that measures each part of a run."""
 
     def __init__(self, steps: int) -> None:
-        """Measure a run of so many steps."""
+        """Start to measure a run of a number of steps."""
         self._steps, self._before = steps // _PARTS, 0.0
         self.times: list[float] = []
 
@@ -64,7 +64,7 @@ class Parts:
 
 @contextmanager
 def timed(times: list[float]) -> Iterator[None]:
-    """Note how long every checkpoint takes [s]."""
+    """Record the time of every checkpoint [s]."""
     written: Any = Checkpoints._write
 
     def counted(self: Checkpoints, run: Run) -> None:

@@ -127,7 +127,7 @@ _UNIFMU_DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def pythonfmu(folder: Path) -> Path:
-    """The vehicle as PythonFMU builds it."""
+    """Build the vehicle by PythonFMU."""
     from pythonfmu import FmuBuilder  # noqa: PLC0415
 
     script = folder / "surge.py"
@@ -149,7 +149,7 @@ def unifmu(folder: Path) -> Path:
 
 
 def casadi(folder: Path) -> Path:
-    """The vehicle as CasADi exports it."""
+    """Export the vehicle by CasADi."""
     from casadi import DaeBuilder  # noqa: PLC0415
 
     here = Path.cwd()
@@ -246,7 +246,7 @@ class CoSimulation:
         self.slave.setFMUstate(self.slave.deSerializeFMUstate(state))
 
     def end(self) -> None:
-        """Free the instance, and leave the library where it is."""
+        """Free the instance, but keep the library."""
         self.slave.fmi2FreeInstance(self.slave.component)
 
 
@@ -304,12 +304,12 @@ class ModelExchange:
         )
 
     def end(self) -> None:
-        """Free the instance, and leave the library where it is."""
+        """Free the instance, but keep the library."""
         self.model.fmi3FreeInstance(self.model.component)
 
 
 def run(fmu: Path) -> None:
-    """Run one FMU and tell what was found, a JSON object a line."""
+    """Run one FMU and print the results, one JSON object per line."""
     os.set_inheritable(int(os.environ[_PIPE]), False)  # an FMU may start processes that stay
     with TemporaryDirectory(prefix="others") as folder:
         fmpy.extract(fmu, folder)
@@ -342,12 +342,12 @@ def run(fmu: Path) -> None:
 
 
 def say(**found: object) -> None:
-    """One line to the parent, past whatever the FMU prints."""
+    """Print one line for the parent process, distinct from the FMU's output."""
     os.write(int(os.environ[_PIPE]), json.dumps(found).encode() + b"\n")
 
 
 def empty_calls() -> float:
-    """Seconds of three calls through ctypes that do next to nothing."""
+    """Seconds of three empty calls through ctypes."""
     compare, one, size = ctypes.CDLL(None).memcmp, (ctypes.c_double * 1)(), ctypes.c_size_t(0)
     start = perf_counter()
     for _ in range(STEPS):

@@ -65,7 +65,7 @@ class State(ctypes.Structure):
 
 
 def built(command: tuple[str, ...], path: Path) -> ctypes.CDLL:
-    """The program as a library, which a command compiles into a file."""
+    """Library that a command compiles from the program."""
     subprocess.run([*command, "-shared", "-fPIC", SOURCE, "-o", path, "-lm"], check=True)
     library = ctypes.CDLL(str(path))
     library.run.argtypes = (ctypes.c_long, ctypes.POINTER(State))
@@ -81,14 +81,14 @@ def run(library: ctypes.CDLL, steps: int) -> State:
 
 
 def builds(folder: Path) -> Iterator[tuple[str, Callable[[int], object]]]:
-    """The builds for which there is a compiler, each as what makes a run of some steps."""
+    """Functions that make a run of some steps, for each build with a compiler."""
     for name, command in _BUILDS.items():
         if find_spec("ziglang") if "ziglang" in command else shutil.which(command[0]):
             yield name, partial(run, built(command, folder / f"{name.replace(' ', '')}.so"))
 
 
 def batch() -> Callable[[int], object]:
-    """The batch engine, as what makes a run of some steps."""
+    """Function that makes a run of some steps by the batch engine."""
     engine = BatchEngine({"fig4": load("fig4")})
 
     def make(steps: int) -> None:
@@ -101,7 +101,7 @@ def batch() -> Callable[[int], object]:
 def step_times(
     rows: dict[str, Callable[[int], object]], steps: int, repetitions: int
 ) -> dict[str, float]:
-    """Microseconds of a step of each, without what a run begins with: of the shortest runs."""
+    """Microseconds of a step of each, in the shortest runs, without their start."""
     once, whole = dict.fromkeys(rows, inf), dict.fromkeys(rows, inf)
     for _ in range(repetitions):
         for name, make in rows.items():

@@ -100,17 +100,17 @@ _DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def chain(n: int) -> list[tuple[int, int, str]]:
-    """Each feeds the next."""
+    """A chain: each component feeds the next."""
     return [(i, i + 1, "u") for i in range(n - 1)]
 
 
 def star(n: int) -> list[tuple[int, int, str]]:
-    """The first feeds all others."""
+    """A star: the first component feeds all others."""
     return [(0, i, "u") for i in range(1, n)]
 
 
 def neighbours(n: int) -> list[tuple[int, int, str]]:
-    """Each feeds the next, and that one feeds it."""
+    """Neighbours: each component feeds the next, and the next feeds it."""
     return chain(n) + [(i + 1, i, "v") for i in range(n - 1)]
 
 
@@ -118,7 +118,7 @@ SHAPES = {shape.__name__: shape for shape in (chain, star, neighbours)}
 
 
 def build(folder: Path, responds: bool) -> Path:
-    """The FMU."""
+    """Build the FMU."""
     compiler = shutil.which("cc")
     if compiler is None:
         raise SystemExit("planning.py needs a C compiler, cc")
@@ -134,7 +134,7 @@ def build(folder: Path, responds: bool) -> Path:
 
 
 def write(fmu: Path, shape: str, n: int, folder: Path) -> None:
-    """A system in the formats of all hosts."""
+    """Write a system in the formats of all hosts."""
     small = read_component("a", fmu)
     names = [f"a{i}" for i in range(n)]
     connections = [
@@ -148,7 +148,7 @@ def write(fmu: Path, shape: str, n: int, folder: Path) -> None:
 
 
 class _First(Table):
-    """A table that knows when the first exchange was over."""
+    """A table with the time of the first exchange."""
 
     at = 0.0
 
@@ -158,7 +158,7 @@ class _First(Table):
 
 
 def ours(folder: Path) -> tuple[float, float, float]:
-    """Our master."""
+    """Run by our master."""
     begun = perf_counter()
     system = load(str(folder / "large.ssp"))
     read = perf_counter()
@@ -172,7 +172,7 @@ def ours(folder: Path) -> tuple[float, float, float]:
 
 
 def in_libcosim(folder: Path) -> tuple[float, float, float]:
-    """libcosim."""
+    """Run by libcosim."""
     tool = measuring.libcosim()
     begun = perf_counter()
     execution = tool.from_osp_config_file(osp_path=str(folder))
@@ -187,7 +187,7 @@ def in_libcosim(folder: Path) -> tuple[float, float, float]:
 
 
 def in_ecos(folder: Path) -> tuple[float, float, float]:
-    """ecos."""
+    """Run by ecos."""
     tool = measuring.ecos()
     begun = perf_counter()
     with tool.EcosSimulation(step_size=STEP, ssp_path=str(folder / "large.ssp")) as simulation:

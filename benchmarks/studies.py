@@ -47,7 +47,7 @@ _TRIED = 5
 
 
 class Timed(NamedTuple):
-    """An engine that says how much processor time each run takes, and nothing else of it."""
+    """An engine whose only result is the processor time of each run."""
 
     engine: Engine
     digest: str = "timed"
@@ -67,7 +67,7 @@ class Idle(NamedTuple):
     digest: str = "idle"
 
     def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
-        """Make nothing."""
+        """Return nothing."""
         for point in points:
             yield Outcome(point.number, dict.fromkeys(index_columns(), 0.1 * point.number))
 
@@ -121,7 +121,7 @@ def keeping(n: int) -> tuple[float, float, float]:
 
 
 def block(n: int) -> float:
-    """Seconds that a block takes to get there and back when there is nothing to do."""
+    """Seconds of an empty block, from sending to its result."""
     space = starts(n, 1.0)
     with (
         patch.object(blocks_module, "_MOST_RUNS", 1),

@@ -50,7 +50,7 @@ LIMIT = 600.0
 
 
 class Watch:
-    """An observer that drops the rows, and knows when the first exchange was over."""
+    """An observer that drops the rows, and records the time of the first exchange."""
 
     began, memory, spent, ended = 0.0, 0.0, 0.0, 0.0
 
@@ -83,7 +83,7 @@ def found(n: int, kind: KindName, loop: LoopName, steps: int) -> list[float]:
 
 
 def in_hosts(n: int) -> str:
-    """The step of a vehicle in other hosts."""
+    """Time of a step of a vehicle in other hosts."""
     steps = HOST_STEPS // n
     verdicts = compare(load({"vehicles": n}, NATIVE), HOSTS_BESIDE, steps, STEP)
     return "".join(

@@ -56,7 +56,7 @@ TOLERANCES = (0.1, 0.25, 0.5)
 
 
 class Option(NamedTuple):
-    """One way to fill in what the paper leaves open, and what is printed that it contradicts."""
+    """One option of an open point, and the printed statement that it contradicts."""
 
     text: str
     parameters: Mapping[str, Any] = {}  # never changed
@@ -68,7 +68,7 @@ _WAVES, _SIGN = Disturbance(), "(2): the sign of tau_w"
 _FORWARD, _BACKWARD = {"disturbance.A_f": -_WAVES.A_f}, {"disturbance.A_d": -_WAVES.A_d}
 Choices = Mapping[str, Sequence[Option]]
 
-#: Choices that runs depend on; the scenarios have the first option of each.
+#: Choices for runs; the scenarios have the first option of each.
 CHOICES: Choices = {
     "eps_t of the proposed controller": [
         Option("10, as for PD"), Option("1, as for Fig. 4", {"controller.eps_t": 1.0}),
@@ -115,9 +115,9 @@ CHOICES: Choices = {
     ],
 }  # fmt: skip
 OF_PROPOSED = ("eps_t of the proposed controller", "observer")
-#: The vehicle of (1) and (2): from 30 m away it passes the pole of (1), where the last bits decide.
+#: The vehicle of (1) and (2). From 30 m away it passes the pole of (1), and is chaotic.
 FIVE = Option("five degrees of freedom", {"plant.roll": False}, "4.1: 6-DOF")
-#: Choices that are left when a run is done, apart from T_f: the signal, and the reading of it.
+#: Choices for the evaluation of a run, apart from T_f: the signal, and its reading.
 SIGNALS = [Option("applied"), Option("commanded")]
 ORDERS = [
     Option("(u, q, r)"), Option("(u, r, q)", against="below (6): tau_a = (tau_u, tau_q, tau_r)"),
@@ -133,7 +133,7 @@ def six_of(made: Table) -> np.ndarray:
     """L2 norms and e_f of a run, with axes for SIGNALS and END_TIMES before them."""
     if made.time[-1] < END_TIMES[-1] - STEP:
         return np.full((2, len(END_TIMES), 6), np.nan)
-    # Half a step is more than times are rounded by.
+    # Half a step is more than the rounding errors of times.
     ends = np.searchsorted(made.time, END_TIMES - 0.5 * STEP)
     begins = np.searchsorted(made.time, made.time[ends] - LAST)
     error, h = np.abs(errors(made)), np.diff(made.time)[:, np.newaxis]
@@ -181,15 +181,15 @@ def medians(engine: BatchEngine, runs: Sequence[Point]) -> list[tuple[np.ndarray
 
 
 def single(engine: BatchEngine, runs: Sequence[Point]) -> list[tuple[np.ndarray, Approach | None]]:
-    """The six of runs, and their ways to the reference; a task for a worker."""
+    """The six of runs, and their approach to the reference; a task for a worker."""
     return [(six_of(made), approach_of(made)) for made in map(engine.table, runs)]
 
 
 class Variants:
-    """All combinations of some choices, and what they give."""
+    """All combinations of some choices, with their numbers."""
 
     def __init__(self, crew: Workers, choices: Choices, task: Any, size: int) -> None:
-        """Make the runs, so many at a time, by a task."""
+        """Make the runs by a task, `size` at a time."""
         self.chosen = [dict(zip(choices, some, strict=True)) for some in product(*choices.values())]
         self.runs = [[run_of(name, chosen) for name in SCENARIOS] for chosen in self.chosen]
         points = list({str(run): run for pair in self.runs for run in pair}.values())
@@ -226,7 +226,7 @@ class Variants:
         return np.array([read.min(axis=0), read.max(axis=0)])
 
     def near(self, tolerance: float) -> int:
-        """The largest number of the twelve that are within a tolerance at once."""
+        """Largest number of the twelve that are within a tolerance at once."""
         away = (np.abs(as_read(self.twelve, *reading) / PRINTED - 1.0) for reading in READINGS)
         return max(int((one <= tolerance).sum(axis=-1).max()) for one in away)
 
@@ -239,12 +239,12 @@ class Variants:
 
 
 def digits(value: float) -> str:
-    """Three digits, without an exponent for the efforts of wild runs."""
+    """Three digits, without an exponent for large efforts."""
     return f"{value:.3g}" if value < 1000.0 else f"{value:,.0f}"
 
 
 def print_variants(crew: Workers, engine: BatchEngine, six: Variants, five: Variants) -> None:
-    """Print ours and the nearest beside what is printed, and how they are read."""
+    """Print our numbers, the nearest ones and the printed ones, and their options."""
     shown = {
         "ours": (six, (0, 0, int(np.flatnonzero(END_TIMES == 100.0)[0]), 0)),
         "nearest": (six, np.unravel_index(six.consistent.argmin(), six.scores.shape)),
@@ -293,7 +293,7 @@ def print_variants(crew: Workers, engine: BatchEngine, six: Variants, five: Vari
 
 
 def print_rest(six: Variants, five: Variants) -> None:
-    """Print how near numbers are at once, what impulses ask for, and the scores of all options."""
+    """Print numbers that are near at once, bounds from impulses, and the scores of all options."""
     for title, held in (("six", six), ("five", five)):
         print(
             f"{title} degrees of freedom, {held.scores.size:,} variants: at most "

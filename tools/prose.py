@@ -79,10 +79,10 @@ _INDENTED = re.compile(
     r"(?<=::\n)(?:\n| {4}.*(?:\n|\Z))+|(?:(?<=\n\n) {4}.*(?:\n|\Z))(?: {4}.*(?:\n|\Z)|\n)*"
 )
 
-#: Comments that are orders to tools.
+#: Comments for tools.
 _ORDER = re.compile(r"!|fmt:|noqa|type:|pragma|mypy:|clang-format|eslint|@ts-|prettier")
 
-#: Comments in C and in TypeScript; strings are found so that nothing in them is one.
+#: Comments in C and TypeScript, and strings, which may contain their signs.
 _C_COMMENT = re.compile(
     r'"(?:\\.|[^"\\\n])*"|/\*(?P<block>.*?)\*/|(?<!:)//(?P<line>[^\n]*(?:\n[ \t]*//[^\n]*)*)', re.S
 )
@@ -201,7 +201,7 @@ def c_blocks(text: str) -> Iterator[Block]:
 
 
 def without_code(text: str) -> str:
-    """Return a docstring in which code is a sign, on the same lines."""
+    """Return a docstring with a sign in place of code, on the same lines."""
     first, *rest = text.split("\n", 1)
     text = "\n".join([first, *(cleandoc(f"\n.\n{rest[0]}").split("\n", 1)[1:] if rest else [])])
     for code in (_INDENTED, _INLINE):
@@ -262,7 +262,7 @@ def length(sentence: str) -> int:
 
 @cache
 def rules() -> Sequence[Rule]:
-    """The words to avoid that the file lists."""
+    """Rules of the file."""
     return [
         Rule(
             pattern(rf"(?<!\w)(?:{rule['find']})(?!\w)"),
@@ -280,7 +280,7 @@ def pattern(text: str) -> re.Pattern[str]:
 
 
 def findings(page: Page) -> Iterator[str]:
-    """A line for each place of a page where something else should be written."""
+    """Findings on a page, one line each."""
     text = _BETWEEN.join(block.text for block in page.blocks)
     begins = [0, *accumulate(len(block.text) + len(_BETWEEN) for block in page.blocks)]
     found = [(*span, rule.write) for rule in rules() if not rule.opens for span in rule.spans(text)]
@@ -304,9 +304,9 @@ def library_findings(text: str) -> Iterator[tuple[int, int, str]]:
         registry.register_many(library_checks)
     selected = DEFAULT["checks"] | dict.fromkeys(_OFF, False)
     for result in LintFile("text", f"{text}\n").lint({**DEFAULT, "checks": selected}):
-        # It puts a line in front.
+        # LintFile inserts a line at the beginning.
         begin, end = (place - 1 for place in result.check_result.span)
-        # It finds "for ever" in "for every", and numbers and symbols that occur twice.
+        # False findings: "for ever" in "for every", and repeated numbers and symbols.
         is_word = not text[end - 1 : end + 1].isalpha()
         if is_word and not re.fullmatch(r"(?:\w|[\d.]+)\s+(?:\w|[\d.]+)", text[begin:end]):
             yield begin, end, result.check_result.message
@@ -334,7 +334,7 @@ _FOREIGN = {"node_modules", "__pycache__"}
 
 
 def main() -> int:
-    """Print findings and lengths; the exit status."""
+    """Print findings and lengths, and return the exit status."""
     command = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     command.add_argument("path", nargs="*", type=Path, help="page or folder; default: all")
     paths = [path.resolve() for path in command.parse_args().path]

@@ -100,7 +100,7 @@ _STANDARD = {
 
 
 def reference_inputs(component: Component, span: Span = SPAN) -> np.ndarray:
-    """Inputs without special values: each circles around its start with a frequency of its own.
+    """Inputs that oscillate around their start values, each with its own frequency.
 
     A Real is a sine, small enough for the gate; a Boolean is true while that is not negative.
     """
@@ -219,7 +219,7 @@ def write_examples(root: Path) -> list[Path]:
 
 
 def example_span(fmu: Path) -> Span:
-    """The reference run of an example: its default experiment, with longer steps if need be."""
+    """Reference run of an example: its default experiment, with longer steps if necessary."""
     stated = read_component(fmu.stem, fmu).experiment
     stop_time, step = stated("stopTime"), stated("stepSize")
     assert stop_time is not None and step is not None

@@ -88,7 +88,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Point links to the site's pages, and to the live page from where it is announced."""
+    """Point links to the site's pages and to the live page."""
     place = page.file.src_uri
     [boost] = [n for beginning, n in BOOSTS.items() if place.startswith(beginning)] or [1.0]
     page.meta["search"] = {"boost": boost}

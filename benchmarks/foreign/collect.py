@@ -69,7 +69,7 @@ class Item:
 
     @property
     def name(self) -> str:
-        """Its place and path."""
+        """Repository and path."""
         return f"{self.place}/{self.path}"
 
     @property
@@ -94,7 +94,7 @@ class Item:
 
 
 def collect(folder: Path) -> list[Item]:
-    """Clone all places, and lay out what they have in a folder.
+    """Clone all repositories, and store their files in a folder.
 
     Args:
         folder: that keeps the clones and the files; what it has is not fetched again.
@@ -127,7 +127,7 @@ class _Clone:
     """A repository at one commit, whose files are read one by one."""
 
     def __init__(self, folder: Path, place: str, commit: str) -> None:
-        """Clone it, unless that has been done."""
+        """Clone the repository, unless it is there."""
         self.place, self._folder, self._commit = place, folder, commit
         if not folder.is_dir():
             # Without the files: a few of them are wanted, and git fetches those when they are read.
@@ -137,7 +137,7 @@ class _Clone:
         self.paths = self._git("ls-tree", "-r", "-z", "--name-only", commit).decode().split("\0")
 
     def read(self, path: str) -> bytes | None:
-        """A file; None where it cannot be had."""
+        """Content of a file; None if it is not available."""
         try:
             return self._git("show", f"{self._commit}:{path}")
         except subprocess.CalledProcessError:

@@ -97,7 +97,7 @@ def _ours(file: Path, out: Path, *options: str) -> dict[str, Any]:
 
 
 def _against(*command: object, skip: int = 0) -> float | str:
-    """Largest deviation from another host, relative to a column's size where that is above one.
+    """Largest deviation from another host, relative to the size of a column if it is above one.
 
     Args:
         command: that runs it; the last of it is what our run has written.
@@ -123,7 +123,7 @@ def _against(*command: object, skip: int = 0) -> float | str:
 
 
 def _run(*command: object) -> str:
-    """Run a script to its end; returns why it has not come to it."""
+    """Run a script; return the reason if it fails."""
     with TemporaryDirectory() as folder:
         process = subprocess.Popen(
             [sys.executable, *map(str, command)],

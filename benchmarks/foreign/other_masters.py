@@ -39,7 +39,7 @@ def libcosim(file: str, step: float, steps: int, outputs: Sequence[Output]) -> n
 
 
 def libcosim_export(file: str, step: float, steps: int, outputs: Sequence[Output]) -> np.ndarray:
-    """The same, of the system as we have read it, in libcosim's own configuration."""
+    """Values of the outputs after each step, from libcosim with our export of the system."""
     from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
 
     write_osp(replace(load(file), step=step), Path())

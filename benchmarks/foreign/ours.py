@@ -34,7 +34,7 @@ def system_of(file: Path) -> System:
 
 
 def step_of(system: System) -> float:
-    """The step that a system asks for, or its first FMU that names one [s]."""
+    """Step of a system, or of its first FMU with one [s]."""
     stated = [c.description.defaultExperiment for c in system.components.values()]
     steps = [float(s.stepSize) for s in stated if s is not None and s.stepSize]
     return system.step or next(iter(steps), DEFAULT_STEP)
@@ -62,7 +62,7 @@ def _other(variable: Variable, start: Value | None) -> float | None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Run what a file holds, and keep the rows of its outputs."""
+    """Run the system in a file, and keep the rows of its outputs."""
     with warnings.catch_warnings(record=True) as caught:
         system = system_of(options.file)
         step = step_of(system)
@@ -100,7 +100,7 @@ def _keep(result: Result, names: list[str], out: Path) -> None:
 
 
 def main() -> None:
-    """Run it, and write what came of it."""
+    """Run the file, and write the result."""
     parser = argparse.ArgumentParser()
     parser.add_argument("file", type=Path)
     parser.add_argument("steps", type=int)

@@ -62,7 +62,7 @@ every archive what its run reported. Files with the same bytes count once.
 
 
 def page(found: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
-    """The page."""
+    """Text of the page."""
     head = _HEAD.format(steps=STEPS, host=lines_of_host, tools=" and ".join(_tools()))
     there = [one for one in found if one["outcome"] != "absent"]
     archives = [one for one in there if not one["is_fmu"]]
@@ -72,7 +72,7 @@ def page(found: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
 
 
 def listed(found: Sequence[Mapping[str, Any]]) -> str:
-    """The table of files, in CSV: what does not run and why, and what archives report."""
+    """Table of files in CSV: reasons of those that do not run, and messages of archives."""
     text = StringIO()
     table = writer(text, lineterminator="\n")
     table.writerow(("kind", "file", "outcome"))
