@@ -148,7 +148,7 @@ def page_of(component: str) -> Path:
 def component_pages() -> dict[Path, str]:
     """Pages of the components, on which parameters that another page has are only named."""
     first = ("AuvPlant", "ObserverController", "Remus100")
-    pages, told = {}, dict[str, str]()
+    pages, owners = {}, dict[str, str]()
     for name in sorted(components(), key=lambda name: (name not in first, name)):
         lines, shared = [], defaultdict[str, list[str]](list)
         for line in component_page(source_of(name)).splitlines():
@@ -156,9 +156,9 @@ def component_pages() -> dict[Path, str]:
             if (
                 line.startswith("| `")
                 and line.count(" | ") == 4
-                and told.setdefault(line, name) != name
+                and owners.setdefault(line, name) != name
             ):
-                shared[told[line]].append(line.split(" | ")[0].removeprefix("| "))
+                shared[owners[line]].append(line.split(" | ")[0].removeprefix("| "))
                 continue
             if line == FILLED[1]:
                 for other, same in shared.items():

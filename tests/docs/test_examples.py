@@ -131,7 +131,7 @@ def test_example_of_a_component_is_built_verified_and_run(workplace):
 @needs("hosts", "libcosimpy")
 @pytest.mark.parametrize(("number", "options"), [(0, []), (1, ["--format", "fmu"])])
 def test_libcosim_moves_the_vehicle_as_the_page_says(workplace, number, options):
-    """It evaluates an archive in another order than one FMU, but neither stays at zero."""
+    """An archive is evaluated in another order than one FMU, but neither stays at zero."""
     assert main(["export", "fig4", *options]) == 0
     python = [sys.executable, "-c", blocks(LIBCOSIM, "python")[number].text]
     ended = subprocess.run(python, capture_output=True, text=True, check=True)
@@ -196,7 +196,7 @@ def test_study_has_as_many_runs_as_the_page_says():
 
 @needs_studies
 def test_an_index_of_ones_own_is_a_column(workplace):
-    """The last time at which the depth is away, of the rows of each run."""
+    """The last time at which the depth is not near, from the rows of each run."""
     Path("settling_time.py").write_text(blocks(STUDIES, "python")[1].text)
     Path("settling.toml").write_text(blocks(STUDIES, "toml")[1].text)
     assert main(["check", "settling.toml"]) == 0
@@ -221,7 +221,7 @@ RK4 = {**QUIET, "plant.integrator": "rk4"}
 
 
 def said_of_accuracy(*cells: str) -> list[str]:
-    """The rest of the first row of a table that begins with some cells, without its marks."""
+    """Rest of the first row that begins with some cells, without bold marks."""
     begins = f"| {' | '.join(cells)} |"
     lines = ACCURACY.read_text(encoding="utf-8").splitlines()
     found = next(line for line in lines if line.startswith(begins))
@@ -230,7 +230,7 @@ def said_of_accuracy(*cells: str) -> list[str]:
 
 @pytest.mark.parametrize("name", ["fig4", "fig5-pd"])
 def test_paths_of_the_plants_schemes_are_as_far_apart_as_the_page_says(name):
-    """To the two digits of the page; of `rk4` that it is exact to less than a micrometre."""
+    """To the two digits of the page; `rk4` is exact to less than a micrometre."""
     euler, rk4, exact = (
         true_control_point(simulate(name, values, kind="native"))
         for values in (QUIET, RK4, {**RK4, "plant.h_max": 0.002})
@@ -252,7 +252,7 @@ def test_effort_of_the_pd_controller_belongs_to_the_plants_scheme_as_the_page_sa
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 def test_a_users_trajectory_follows_its_table(capsys: pytest.CaptureFixture[str]):
-    """Between the rows it is the curve that the rows are on, whose derivatives are known."""
+    """Between the rows it follows the curve of the rows, whose derivatives are known."""
     executed(TRAJECTORIES, capsys)
     Path("table_planner.py").write_text(blocks(TRAJECTORIES, "python")[1].text)
     Path("eight.toml").write_text(blocks(TRAJECTORIES, "toml")[0].text)

@@ -53,7 +53,7 @@ def final_error(folder: Path) -> list[float]:
 
 
 def test_law_of_the_guide_follows_the_reference(followed: Path):
-    """Within what the page says: at first, with an integral, and with a sixth of the gain."""
+    """Within the numbers of the page: at first, with an integral, and with a sixth of the gain."""
     assert max(final_error(followed / "script/results")) == pytest.approx(0.046, abs=5e-4)
     assert max(final_error(followed / "my_law/results")) == pytest.approx(0.020, abs=5e-4)
     assert max(final_error(followed / "my_law/soft")) > 0.2
@@ -133,7 +133,7 @@ def test_mistake_in_a_script_is_told_with_its_line(text, complaint, tmp_path, ca
     ],
 )
 def test_mistake_in_a_step_is_told_once_with_its_line(options, isolated, workplace, capsys):
-    """One that shows after half a second, in a module beside the script; rows until then stay."""
+    """A mistake after half a second, in a module of the same folder; earlier rows stay."""
     assert main(["new", "controller", "my_law", ".", *options]) == 0
     Path("beside.py").write_text("def waiting(t):\n    return t < 0.5 or value\n")
     script = Path("my_law.py")
@@ -158,7 +158,7 @@ def test_mistake_in_a_step_is_told_once_with_its_line(options, isolated, workpla
 
 
 def built_with(old: str, new: str) -> int:
-    """Build a controller with another text in it; the number of that text's last line."""
+    """Build a controller with a changed text; return the number of the last line of that text."""
     assert main(["new", "controller", "my_law", ".", "--python"]) == 0
     script = Path("my_law.py")
     before, found, after = script.read_text().partition(old)

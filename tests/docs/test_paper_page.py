@@ -95,7 +95,7 @@ def test_sway_and_heave_depend_on_controller_and_start():
 
 @given(limit=st.floats(100.0, 1e6))
 def test_rho_hat_takes_the_command_beyond_any_limit(limit):
-    """A metre from the reference, at rest, with a theta_0 of that size."""
+    """A metre from the reference, at rest, with a large theta_0."""
     gains = Gains(theta_0=(limit + 100.0, 0.0, 0.0, 0.0))
     here, there = (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     measured = Measurement(here, there, there, there, there)
@@ -117,7 +117,7 @@ def test_the_helix_is_not_bounded():
 
 
 def test_remark_5_in_figure_4():
-    """Twice the rate of z over the estimate below (21), in per cent."""
+    """Ratio of twice the rate of z to the estimate below (21) [%]."""
     text = text_of("(38) rests on an approximation")
     found = []
     for setting in (QUIET, PAPER):
@@ -136,7 +136,7 @@ def test_remark_5_in_figure_4():
 
 
 def peak(lambda_, h=PAPER.h, gamma=1.0):
-    """Largest surge command of Fig. 4 without noise [N]; it comes within the first seconds."""
+    """Largest surge command of Fig. 4 without noise [N], in the first seconds."""
     gains = Gains(lambda_=lambda_, gamma=gamma)
     setting = QUIET._replace(controller=gains, h=h, h_max=LongestSteps())
     return max(abs(instant.command[0]) for instant in closed_loop(round(4.0 / h), setting))
@@ -191,7 +191,7 @@ def test_pd_efforts_belong_to_the_step():
 
 
 def test_the_circle_is_the_one_of_2():
-    """v and u follow from r in (2) at rest; what is left is a polynomial of fifth degree in r."""
+    """v and u follow from r in the steady (2), which leaves a polynomial of fifth degree in r."""
     text = text_of("4.1: the quoted turning radius has the size of the diameter")
     m11, m22, d11, d22, d66 = 25.0, 17.5, 30.0, 30.0, 20.0
     inverse_of_u = np.array([m11 * m22 / d22, 0.0, d11]) / 80.0

@@ -65,7 +65,7 @@ def roughness(seed: int) -> np.ndarray:
 
 
 def parts(index: str, printed: tuple[tuple[float, ...], ...], seed: int) -> np.ndarray:
-    """An index of both controllers in Fig. 5 over what the paper prints."""
+    """An index of both controllers in Fig. 5, relative to the printed one."""
     return np.divide(column(index, "fig5", "fig5-pd", seed=seed), printed)
 
 
@@ -96,7 +96,7 @@ def adds_up(seed: int) -> bool:
 
 
 class Said(NamedTuple):
-    """Words of README, and whether a run without noise (seed 0), or a draw of it, shows them."""
+    """Words of README, and a function that checks them in a run (seed 0: without noise)."""
 
     words: str
     quiet: Callable[[], bool] | None

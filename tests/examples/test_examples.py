@@ -23,7 +23,7 @@ REFERENCE = Path(__file__).parent / "reference"
 
 
 def reference(name: str) -> dict[str, list[float]]:
-    """A published result: its columns."""
+    """Columns of a published result."""
     lines = (REFERENCE / f"{name}.csv").read_text().splitlines()
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     return {column: [float(row[column]) for row in rows] for column in rows[0]}
@@ -35,7 +35,7 @@ def near(found: Any, expected: Any, *, atol: float = 0.0, rtol: float = 0.0) -> 
 
 
 def solution(rate: Any, x0: Any, times: Any) -> Any:
-    """States at times, by an integration that is much more exact than what it is compared with."""
+    """States at times, by a much more exact integration than the tested one."""
     found = solve_ivp(rate, (times[0], times[-1]), x0, "DOP853", times, rtol=1e-11, atol=1e-12)
     return found.y
 

@@ -184,7 +184,7 @@ def test_what_d_lacks_is_linear_in_dy_and_in_w(theta, psi, w, dy, k):
 
 @given(theta=pitch_angles, psi=angles, w=vectors(speeds, 2), ell=lengths)
 def test_drift_does_not_depend_on_the_attitude(theta, psi, w, ell):
-    """J^-1 J_delta, which (15) has a derivative by eta of, and by w."""
+    """J^-1 J_delta, whose derivatives by eta and w are in (15)."""
     found = np.linalg.solve(J(theta, psi, ell), J_delta(theta, psi, np.array(w)))
     np.testing.assert_allclose(found, drift(ell) @ w, atol=1e-12 / ell)
 
@@ -210,7 +210,7 @@ def test_p2_1_inertia_is_symmetric_and_bounded(theta, psi, x, ell):
 
 @given(theta=pitch_angles, psi=angles, dy=vectors(speeds, 3), x=vectors(speeds, 3))
 def test_p2_2_rate_of_inertia_minus_twice_coriolis_is_skew(theta, psi, dy, x):
-    """With the attitude turning as it does without sway and heave, as C_2 has it."""
+    """For an attitude that turns as without sway and heave, as in C_2."""
     *_, dtheta, dpsi = kinematic_matrix(theta, psi) @ np.linalg.solve(J(theta, psi, ELL), dy)
     h = 1e-6
     M_2_dot = M_2(VEHICLE, theta + h * dtheta, psi + h * dpsi, ELL)
@@ -257,7 +257,7 @@ def test_p2_3_fails_for_other_velocities():
 
 
 def test_no_c_2_has_both_p2_2_and_p2_3():
-    """P2.3 leaves one that is linear in the velocity, by polarisation, and it has not P2.2.
+    """P2.3 determines a C_2 that is linear in the velocity, by polarisation, and P2.2 fails for it.
 
     C(x) y = (C_2(x) y + C_2(y) x) / 2 has the product C_2(dy) dy of (15). Under surge alone M_2 is
     at rest, so P2.2 asks for y^T C(x) y = 0: it is -m66 / (2 ell^3).

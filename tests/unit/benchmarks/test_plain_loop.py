@@ -1,4 +1,4 @@
-"""The loop of Fig. 4 in C written by hand makes the numbers of the straight line."""
+"""The loop of Fig. 4 in C written by hand has the numbers of straight-line Python."""
 
 from __future__ import annotations
 

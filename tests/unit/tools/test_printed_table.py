@@ -1,4 +1,4 @@
-"""The printed table: what is read off runs, against indices of FMUs and formulas by hand."""
+"""The tool for the printed table, compared with indices of FMUs and formulas by hand."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def variants(engine):
 
 
 def test_formulas_are_those_that_someone_would_code():
-    """By the rows themselves, at every end time."""
+    """From the rows, at several end times."""
     tau = np.random.default_rng(2).uniform(-80.0, 80.0, (10_000, 6))
     l2 = np.sqrt(np.cumsum(tau**2 * 0.02, axis=0))[np.round(END_TIMES / 0.02).astype(int) - 1]
     twelve = np.tile(0.01, (len(END_TIMES), 12))
@@ -163,7 +163,7 @@ OPTIONS = [
 
 @pytest.mark.parametrize(("scenario", "option"), OPTIONS)
 def test_every_option_changes_the_system(scenario, option):
-    """Each parameter is there, takes the value, and has another one in the scenario."""
+    """Each parameter exists, accepts the value, and has another one in the scenario."""
     _, system = load_scenario(scenario)
     for name, value in option.parameters.items():
         changed = system.with_parameters({PortName.read(name): value})
