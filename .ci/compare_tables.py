@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from pyarrow import Table, csv, parquet
 
-#: What the C libraries of two systems may differ by after 5,000 steps.
+#: Largest difference that C libraries of two systems may cause within 5,000 steps.
 TOLERANCE = 1e-9
 
 

@@ -1,4 +1,4 @@
-"""In wine, the package ziglang: zig.exe does not run there, so Linux's zig works in its place.
+"""The package ziglang in wine, which runs Linux's zig, because zig.exe does not run there.
 
 Its path is in LINUX_ZIG. Wine starts programs of Linux, but tells neither when they end nor how.
 """

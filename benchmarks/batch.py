@@ -1,4 +1,4 @@
-"""What a step of a vehicle costs in the batch engine: `python benchmarks/batch.py`.
+"""Time of a step of a vehicle in the batch engine: `python benchmarks/batch.py`.
 
 Every repetition makes a run of each of some scenarios, one after the other in this process, and
 takes the processor's time:
@@ -10,8 +10,8 @@ Both make all indices. Printed are medians of the repetitions, ratios being take
 repetition. Then runs of one second are made, more and more of them, and the time of each is printed
 with the memory of the process.
 
-`--check N` instead makes N random runs of every ready study in full length, and counts those of
-which both make the same, to the last bit.
+`--check N` instead makes N random runs of every ready study in full length, and counts the runs
+that are the same with both, to the last bit.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from orchestrator.studies.study import read_study, ready_studies
 _SCENARIOS = ("fig4", "fig5", "fig5-pd", "path", "sea", "remus", "formation-v")
 _STEP = 0.02
 
-#: How many short runs are made.
+#: Numbers of short runs.
 _MANY = (100, 1_000, 10_000, 100_000)
 
 
@@ -48,7 +48,7 @@ def engines(names: Sequence[str]) -> tuple[FmuEngine, BatchEngine]:
 
 
 def processor(function: Callable[[], object]) -> float:
-    """Processor's seconds of one call."""
+    """Processor time of one call [s]."""
     return timed(function, process_time)
 
 
@@ -59,7 +59,7 @@ def make(engine: Engine, points: Iterable[Point]) -> None:
 
 
 def compare(both: Sequence[Engine], steps: int, repetitions: int) -> None:
-    """Print what a step costs."""
+    """Print the time of a step."""
     print(f"medians of {repetitions} repetitions of {steps} steps, processor's time")
     for name in _SCENARIOS:
         points = [Point(0, name, {}, steps * _STEP, _STEP)]
@@ -78,7 +78,7 @@ def compare(both: Sequence[Engine], steps: int, repetitions: int) -> None:
 
 
 def grow(engine: BatchEngine) -> None:
-    """Print what runs cost where there are many."""
+    """Print time and memory of many runs."""
     print(f"{'runs':>8} {'us a run':>9} {'resident [MB]':>14}")
     for n in _MANY:
         points = (Point(i, "fig5", {"plant.eta0.y": float(i % 7)}, 1.0, _STEP) for i in range(n))
@@ -87,7 +87,7 @@ def grow(engine: BatchEngine) -> None:
 
 
 def check(n: int) -> None:
-    """Print of how many runs of the ready studies both engines make the same."""
+    """Print the number of runs of the ready studies that both engines make alike."""
     for name in ready_studies():
         study = read_study(name)
         fmus, batch = engines(study.scenario)

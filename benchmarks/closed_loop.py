@@ -1,12 +1,12 @@
-"""What the FMU loop costs beside a straight line of Python: `python benchmarks/closed_loop.py`.
+"""Time of a step of the FMU loop and of straight-line Python: `python benchmarks/closed_loop.py`.
 
 Every repetition times, one after the other in this process:
 
-- the straight line `auv_fmu.loop.closed_loop`, the same equations without FMI or master;
-- the loop of FMUs, with all checks of the components on;
-- the same FMUs when their components compute nothing, set on their loaded classes;
-- the master alone, with every FMI call replaced by nothing;
-- the loop of FMUs compiled, and the compiled loop alone.
+- straight-line Python, `auv_fmu.loop.closed_loop`, the same equations without FMI or master;
+- the loop of FMUs, with all checks of the components;
+- the same FMUs with components that compute nothing, patched in their loaded classes;
+- only the master, with every FMI call replaced by nothing;
+- the compiled loop of FMUs, and the compiled loop without FMUs.
 
 The set-up of a run (unzip, load, initialise) is timed by a run of one step and subtracted.
 Printed are medians of the repetitions, ratios being taken within each repetition.
@@ -43,7 +43,7 @@ Calls = list[Callable[[], int]]
 
 
 def slave_classes() -> list[type[Component]]:
-    """The classes of the FMUs that are loaded into this process, where `settle` has put them."""
+    """Slave classes of the FMUs in this process, where `settle` has stored them."""
     return [vars(module)[""] for module in list(sys.modules.values()) if "" in vars(module)]
 
 
@@ -86,7 +86,7 @@ def master_alone(system: System, steps: int) -> float:
 
 def compiled_alone(system: System, steps: int, loop: str) -> float:
     """Seconds of the steps of the compiled loop when every function it calls does nothing."""
-    # One, which is FMI's warning, is all that this one has to say.
+    # This function returns 1, which is FMI's warning.
     nothing = ctypes.cast(ctypes.pythonapi.Py_IsInitialized, ctypes.c_void_p).value
     with patch.object(FMU2OfOthers, "address", lambda *_: nothing):
         return steps_time(system, _TIMES * steps, loop=loop) / _TIMES

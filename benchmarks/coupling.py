@@ -1,4 +1,4 @@
-"""What ways of coupling bring and cost: `python benchmarks/coupling.py`.
+"""Accuracy and cost of the ways to couple FMUs: `python benchmarks/coupling.py`.
 
 Linear FMUs, so that the exact solution is known: two masses with a spring and a damper between
 them, and a quarter of a truck on a road. For each way and step the largest error of the coupled
@@ -33,7 +33,7 @@ _RING = {"a.u0": "b.y1", "a.u1": "s.y0", "b.u0": "a.y1"}
 
 
 def _time(system: System, step: float, coupling: str) -> float:
-    """Of a step, without what a run costs at its beginning [us]."""
+    """Time of a step, without the start of a run [us]."""
 
     def run(n: int) -> float:
         experiment = Experiment(n * step, step, coupling=coupling)

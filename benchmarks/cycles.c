@@ -1,4 +1,4 @@
-/* A host that is no Python program: makes an instance of an FMU, uses it, frees it, again and
+/* A host in C: makes an instance of an FMU, uses it, frees it, again and
  * again, and prints the cycles and the resident memory [pages] after each of some numbers of them.
  *
  * usage: cycles LIBRARY RESOURCES CYCLES [CYCLES ...]

@@ -1,8 +1,8 @@
-"""What events cost the compiled loop: none, one at a time, and one that waits for its condition.
+"""Cost of events in the compiled loop: none, one at a time, and one that waits for its condition.
 
     python benchmarks/events.py [STEPS]
 
-Rounds are alternated; times are those of the process, with what a run costs at its beginning.
+Rounds are alternated; times are processor times, with the start of a run.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ CASES = {
 
 
 def cost(events: list[dict[str, object]], steps: int) -> float:
-    """Seconds a step."""
+    """Time of a step [s]."""
     begin = process_time()
     simulate("fig4", stop_time=steps * STEP, kind="native", loop="compiled", events=events)
     return (process_time() - begin) / steps

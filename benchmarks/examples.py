@@ -1,15 +1,16 @@
-"""What a step of each example costs: `python benchmarks/examples.py`.
+"""Time of a step of each example: `python benchmarks/examples.py`.
 
 Every example is built as both kinds of FMU. A loop in C calls fmi2DoStep of one instance, and
-nothing else, with default inputs. Besides, for some examples:
+nothing else, with default inputs. For some examples, there are also:
 
 - The same model as a plain slave of PythonFMU, from `benchmarks/slaves`, as PythonFMU builds it.
 - The Reference FMU in C, if `--reference-fmus DIR` names a folder with a release, or a build, of
   github.com/modelica/Reference-FMUs: FMUs in `2.0` and `3.0`. Each communication step is as long
-  as a step of its solver, and as `h_max` of ours, so both take the same number of solver steps.
+  as a step of its solver, and as `h_max` of the example, so both take the same number of solver
+  steps.
 
-What is compared is timed in turns, in one process, and has to come to the same numbers. Printed are
-medians of processor time; ratios are taken within each turn.
+All are timed in turns, in one process, and must give the same numbers. The output has medians of
+processor time; ratios are taken within each turn.
 """
 
 from __future__ import annotations
@@ -48,14 +49,13 @@ SOLVER_STEPS = {
 OURS = {"stair": {"limit": 2_000_000_000}}
 THEIRS = {"stair": {"counter": -2_000_000_000}}
 
-#: How many more runs a native FMU is timed with: beside those in Python in each turn, and beside
-#: the Reference FMUs in turns of its own.
+#: Runs of a native FMU for each run of an FMU in Python, and in its turns with a Reference FMU.
 RUNS = 20
 
 #: Numbers in an output that is an array in the Reference FMU, and several outputs in ours.
 ARRAYS = {"y": 3}
 
-#: How near a plain slave comes to the same numbers: sums of floats differ in their order.
+#: Tolerance for a plain slave, which adds up floats in another order.
 ROUNDING = 1e-12
 
 
@@ -74,7 +74,7 @@ class Instance:
 
     @property
     def outputs(self) -> list[str]:
-        """Names of the numbers that come out."""
+        """Names of the outputs that are numbers."""
         outputs = (one for one in self.variables.values() if one.causality == "output")
         numbers = (one for one in outputs if one.type in ("Real", "Integer", "Float64", "Int32"))
         return [
@@ -88,7 +88,7 @@ class Instance:
         ]
 
     def begin(self, values: Mapping[str, float]) -> None:
-        """Start anew, with some values."""
+        """Start again, with other values."""
         slave = self._slave
         slave.reset()
         if self.version == "2":
@@ -101,7 +101,7 @@ class Instance:
         slave.exitInitializationMode()
 
     def steps(self, h: float, n: int) -> float:
-        """Seconds of the processor that steps take."""
+        """Processor time of some steps [s]."""
         component = ctypes.c_void_p(self._slave.component)
         seconds = self._loop(self._step, component, ctypes.c_double(h), ctypes.c_int(n))
         if seconds < 0:
@@ -109,7 +109,7 @@ class Instance:
         return float(seconds)
 
     def steps_from_python(self, h: float, n: int) -> float:
-        """The same where each call comes from Python, through ctypes."""
+        """Processor time of some steps that Python calls through ctypes [s]."""
         step, component = self._slave.dll["fmi2DoStep"], self._slave.component
         step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
         start = thread_time()
@@ -118,7 +118,7 @@ class Instance:
         return thread_time() - start
 
     def number(self, name: str) -> float:
-        """What has come out."""
+        """Value of an output."""
         array, _, place = name.rstrip("]").partition("[")
         one = self.variables.get(name) or self.variables[array]
         get = getattr(self._slave, f"get{one.type}")
@@ -132,8 +132,8 @@ class Row(NamedTuple):
 
     Attributes:
         h: step [s].
-        instances: by what they are called.
-        values: that they start with, by the same names.
+        instances: by name.
+        values: start values of each.
 
     """
 
@@ -142,13 +142,13 @@ class Row(NamedTuple):
     values: Mapping[str, Mapping[str, float]]
 
     def begin(self, name: str) -> Instance:
-        """An instance at its start."""
+        """Initialise an instance, and return it."""
         one = self.instances[name]
         one.begin({"h_max": self.h, **self.values[name]})
         return one
 
     def check(self, steps: int, tolerance: float) -> None:
-        """See whether what all instances put out changes by the same numbers."""
+        """Exit if the outputs of the instances do not change by the same numbers."""
         changes = {}
         for name, one in self.instances.items():
             # A plain slave has its outputs only after a step.
@@ -175,7 +175,7 @@ class Row(NamedTuple):
 
 
 def loops(folder: Path) -> ctypes.CDLL:
-    """The loops in C."""
+    """Compile the loops in C."""
     library = folder / "steps.so"
     source = Path(__file__).with_name("steps.c")
     command = [str(machines_compiler()), "-O2", "-fPIC", "-shared", "-o", library, source]
@@ -184,12 +184,12 @@ def loops(folder: Path) -> ctypes.CDLL:
 
 
 def ratio(times: Mapping[str, Sequence[float]], slow: str, fast: str) -> float:
-    """How many times as long one takes as another, by the median of the turns."""
+    """Ratio of two times, as the median over the turns."""
     return median(x / y for x, y in zip(times[slow], times[fast], strict=True))
 
 
 def rows(folder: Path, names: Sequence[str], calls: ctypes.CDLL) -> Iterator[tuple[str, Row]]:
-    """Both kinds of each example, and the plain slave where there is one."""
+    """Both kinds of each example, and its plain slave if there is one."""
     for name in names:
         found = {
             called: Instance(build(name, kind, "2", folder / called), folder / called / name, calls)
@@ -207,7 +207,7 @@ def rows(folder: Path, names: Sequence[str], calls: ctypes.CDLL) -> Iterator[tup
 
 
 def references(folder: Path, given: Path, calls: ctypes.CDLL) -> Iterator[tuple[str, Row]]:
-    """Examples beside the Reference FMUs of both versions of FMI."""
+    """Examples and their Reference FMUs, in both versions of FMI."""
     for version in ("2", "3"):
         for name, h in SOLVER_STEPS.items():
             theirs = given / f"{version}.0" / f"{name_of(name)}.fmu"
@@ -224,13 +224,13 @@ def references(folder: Path, given: Path, calls: ctypes.CDLL) -> Iterator[tuple[
 
 
 def build(name: str, kind: str, fmi: str, folder: Path) -> Path:
-    """The FMU of an example."""
+    """Build the FMU of an example."""
     folder.mkdir(exist_ok=True)
     return build_own(EXAMPLES / name / f"{name}.py", folder, kind=kind, fmi=fmi)
 
 
 def print_kinds(folder: Path, names: Sequence[str], given: Namespace, calls: ctypes.CDLL) -> None:
-    """Both kinds, and plain slaves."""
+    """Print the times of both kinds and of plain slaves."""
     print(
         f"{'':22} {'step [s]':>8} {'native':>8} {'Python':>8} {'/ native':>8} "
         f"{'plain slave':>11} {'Python / plain':>14}"
@@ -252,7 +252,7 @@ def print_kinds(folder: Path, names: Sequence[str], given: Namespace, calls: cty
 
 
 def print_references(folder: Path, given: Namespace, calls: ctypes.CDLL) -> None:
-    """The native kind and the Reference FMUs."""
+    """Print the times of the native kind and of the Reference FMUs."""
     print(f"{'':22} {'step [s]':>8} {'native':>8} {'Reference FMU':>13} {'native / it':>11}")
     for name, row in references(folder, given.reference_fmus, calls):
         row.check(given.steps, 0.0)

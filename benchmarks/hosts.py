@@ -1,10 +1,10 @@
-"""Our master beside other hosts, on any files: `python benchmarks/hosts.py FILE...`.
+"""Our master compared with other hosts, on any files: `python benchmarks/hosts.py FILE...`.
 
-An FMU runs alone, here and in `fmpy.simulate_fmu`; a system in Jacobi order, here and in libcosim
-and ecos, each of which is given all its steps in one call and records nothing, while our master
-keeps all rows. Every pair is a process of its own, in which both take turns; what comes before the
-first step is taken off. Printed are the medians of our time, of theirs, and
-of their ratios. What a host does not run, or ends the process with, has no line but a count.
+A single FMU runs here and in `fmpy.simulate_fmu`; a system in Jacobi order, here and in libcosim
+and ecos, which make all steps in one call and record nothing, while our master keeps all rows. Each
+pair runs in turns, in a separate process; the time before the first step is subtracted. The output
+has the medians of the times of both, and of their ratios. Files that a host does not run, or that
+end its process, are only counted.
 
 Without files: the FMUs and the system of this project, of the native kind.
 """
@@ -40,17 +40,16 @@ from orchestrator.runs.preparation import prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 
-#: Rounds, steps of a run, and the longest that the steps of one run shall take [s].
+#: Rounds, steps of a run, and the longest time of the steps of one run [s].
 ROUNDS, STEPS, LONGEST = 9, 10_000, 0.3
 
-#: Steps that the length of a run is found with, and runs of one step, the shortest of which is
-#: taken off.
+#: Steps of a trial run, and runs of one step; the shortest time of these is subtracted.
 FIRST, SET_UPS = 500, 5
 
-#: How long a pair may take [s].
+#: Time limit for a pair [s].
 PATIENCE = 60
 
-#: Makes a number of steps, and says how long they took [s].
+#: Makes a number of steps, and returns their time [s].
 Run = Callable[[int], float]
 
 
@@ -94,7 +93,7 @@ def in_fmpy(system: System, step: float, _: Path) -> Run:
 
 
 def in_libcosim(system: System, step: float, folder: Path) -> Run:
-    """libcosim on a system in its own format: archives of others end its process."""
+    """libcosim on a system in its own format, because third-party archives end its process."""
     tool = measuring.libcosim()
     write_osp(replace(system, step=step), folder)
 
@@ -109,7 +108,7 @@ def in_libcosim(system: System, step: float, folder: Path) -> Run:
 
 
 def in_ecos(system: System, step: float, folder: Path) -> Run:
-    """ecos on a system as we write it."""
+    """ecos on our SSP of a system."""
     tool = measuring.ecos()
     [ssp] = write_ssp(replace(system, step=step), folder)
 
@@ -123,7 +122,7 @@ def in_ecos(system: System, step: float, folder: Path) -> Run:
     return run
 
 
-#: Hosts by the ends of the names of what they run.
+#: Hosts by the suffixes of their files.
 HOSTS = {
     ".fmu": {"fmpy": in_fmpy},
     ".ssp": {"libcosim": in_libcosim, "ecos": in_ecos},
@@ -131,7 +130,7 @@ HOSTS = {
 
 
 def pair(path: Path, host: str, folder: Path) -> None:
-    """Time a file here and in another host, in turns, and tell both a step [s]."""
+    """Time a file here and in another host, in turns, and print both times of a step [s]."""
     alone = path.suffix == ".fmu"
     system = System(path.stem, {"a": read_component("a", path)}, ()) if alone else read_ssp(path)
     here, step = ours(system, "jacobi")

@@ -1,8 +1,8 @@
 """Size of the FMUs, and the cost of instances after the first: `python benchmarks/instances.py`.
 
-The time of an instance is set against that of a plain Python object of the same class, in the same
-repetition: what is above it is FMI, PythonFMU and the loader. What stays is the growth of resident
-memory over many instances that came and went, and over as many resets of one.
+The time of an instance is compared with a plain Python object of the same class, in the same
+repetition: the difference is due to FMI, PythonFMU and the loader. Leaked memory is the growth of
+resident memory over many instances that were made and freed, and over as many resets of one.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ WARM_UP, MANY = 2000, 5000
 
 
 def growth(function: Callable[[], object]) -> float:
-    """Bytes that one call leaves behind."""
+    """Bytes that remain after one call."""
     for _ in range(WARM_UP):
         function()
     gc.collect()

@@ -1,4 +1,4 @@
-"""What FMUs in processes of their own cost: `python benchmarks/isolation.py`.
+"""Cost of FMUs in separate processes: `python benchmarks/isolation.py`.
 
 Every repetition times the loop of Fig. 4 in one process, then with each FMU in a process of its
 own. The set-up of a run is timed by a run of one step, and subtracted. Printed are medians of the
@@ -20,7 +20,7 @@ from orchestrator.runs.wiring import closed_loop
 
 
 def start_time(system: System, order: str) -> float:
-    """Seconds of a run of one step, each FMU in a process of its own."""
+    """Seconds of a run of one step, with a process for each FMU."""
     plan = make_plan(system, Experiment(STEP, STEP, order), Isolation())
     return timed(lambda: simulate_plan(plan, [Table()]))
 

@@ -1,11 +1,11 @@
-"""What the two kinds of FMUs cost in each host: `python benchmarks/kinds.py`.
+"""Time of a step of both kinds of FMU in each host: `python benchmarks/kinds.py`.
 
-Every repetition times Fig. 4, one after the other: the straight line `auv_fmu.loop.closed_loop`;
-our master on FMUs of the Python kind, on their twins in C, and on these in the compiled loop, every
-port recorded; libcosim and ecos on either kind, which step in Jacobi order, alone and with every
-output read by their Python interfaces, and our compiled loop in that order. What comes before the
-first step is not counted. Printed are medians, ratios being taken within each repetition; then the
-size of the FMUs, and the time of an instance after the first.
+Every repetition times Fig. 4, one after the other: straight-line Python,
+`auv_fmu.loop.closed_loop`; our master on both kinds of FMU, and on native ones in the compiled
+loop, with every port recorded; libcosim and ecos on both kinds, in Jacobi order, with and without a
+read of every output by their Python interfaces, and our compiled loop in that order. Only the steps
+count. The output has medians, with ratios within each repetition, the size of the FMUs, and the
+time of an instance after the first.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from orchestrator.runs.wiring import closed_loop as wired
 #: Instances that are timed.
 INSTANCES = 1000
 
-#: How many runs the compiled loop is timed with.
+#: Number of runs for the time of the compiled loop.
 MORE_COMPILED = 20
 
 #: Seconds that a number of steps takes.
@@ -44,7 +44,7 @@ Engine = Callable[[int], float]
 
 
 class Pair(NamedTuple):
-    """Two engines whose ratio is printed."""
+    """Two engines, to print their ratio."""
 
     fast: str
     slow: str
@@ -78,7 +78,7 @@ def in_our_master(system: System, loop: str, order: str, steps: int) -> float:
 
 
 def in_another(system: System, host: str, is_read: bool, steps: int) -> float:
-    """Steps in a host that is not ours, alone or with every output read."""
+    """Steps in another host, with or without a read of every output."""
     [verdict] = compare(system, [host], steps, STEP)
     if verdict.failure is not None:
         raise SystemExit(f"{host}: {verdict.failure}")
@@ -86,7 +86,7 @@ def in_another(system: System, host: str, is_read: bool, steps: int) -> float:
 
 
 def engines(python: System, native: System) -> dict[str, Engine]:
-    """All that can run here."""
+    """All measurements that can run here."""
     found: dict[str, Engine] = {
         STRAIGHT: straight_line,
         PYTHON: partial(in_our_master, python, "python", "gauss-seidel"),
@@ -127,7 +127,7 @@ def instance_time(fmu: Path, folder: Path) -> float:
 
 
 def libraries_size(fmu: Path) -> float:
-    """What the libraries of an FMU take of its file [kB]."""
+    """Size of the libraries in the file of an FMU [kB]."""
     with ZipFile(fmu) as archive:
         entries = [entry for entry in archive.infolist() if entry.filename.startswith("binaries/")]
     return sum(entry.compress_size for entry in entries) / 1000

@@ -1,11 +1,11 @@
-"""What FMUs leave behind: `python benchmarks/leaks.py [N] [--only WORD]`.
+"""Memory that FMUs leak: `python benchmarks/leaks.py [N] [--only WORD]`.
 
 Makes an instance, initialises and steps it, saves, serialises and restores its state, resets and
 frees it, N times, 10,000 if no number is given. Prints the resident memory after a tenth of the
-cycles and after all of them, and what a cycle between them left behind.
+cycles and after all of them, and the memory that each cycle between them leaked.
 
-Measures every FMU in a Python host and in a C host, built with both loaders, and an FMU with one
-variable as PythonFMU alone builds it: what that one leaves behind is PythonFMU's share.
+Measures every FMU in a Python host and in a C host, built with both loaders, and a plain FMU of
+PythonFMU with one variable, which shows the leaks of PythonFMU itself.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ class Bare(Fmi2Slave):
 
 
 def bare(folder: Path) -> Path:
-    """An FMU as PythonFMU builds it."""
+    """A plain FMU of PythonFMU."""
     script = folder / "bare.py"
     script.write_text(_BARE, encoding="utf-8")
     options = {"handle-state": True, "serialize-state": True}
@@ -60,7 +60,7 @@ def bare(folder: Path) -> Path:
 
 
 def cycle(folder: Path) -> None:
-    """One life of an instance, in a Python host."""
+    """One cycle of an instance in a Python host."""
     fmu = FMU2Slave(guid="", modelIdentifier=identifier(folder), unzipDirectory=str(folder))
     fmu.instantiate()
     fmu.setupExperiment()
@@ -83,7 +83,7 @@ def identifier(folder: Path) -> str:
 
 
 def be_host(folder: Path, counts: list[int]) -> None:
-    """Do and print what the C host does and prints."""
+    """Run cycles in Python, and print the same as the C host."""
     done = 0
     for count in counts:
         for _ in range(count - done):
@@ -125,7 +125,7 @@ def main() -> None:
 
 
 def outcome(command: list[str]) -> str:
-    """What a host printed, as the cells of a row; FMUs without the loader need Python preloaded."""
+    """Output of a host as the cells of a row; FMUs without the loader need Python preloaded."""
     environment = {**os.environ, "LD_PRELOAD": str(_LIBPYTHON)}
     process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     readings = [[int(word) for word in line.split()] for line in process.stdout.splitlines()]

@@ -1,9 +1,9 @@
-"""Whether a long run stays as fast and as small as it began: `python benchmarks/long_runs.py`.
+"""Speed and memory during a long run: `python benchmarks/long_runs.py`.
 
 Fig. 4 is run for a million steps with the observers of `auv-fmu run`, which keep a row a second.
-Printed are, of each tenth of the run, the processor's time for a step and the resident memory of
-the process behind it; then how the last tenth compares with the first. With --checkpoint-every a
-checkpoint is written meanwhile, of which sizes and times are printed as well.
+The output has, for each tenth of the run, the processor time of a step and the resident memory at
+its end, and a comparison of the last tenth with the first. With --checkpoint-every it also has the
+sizes and times of checkpoints.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class Parts:
     """A hook that measures each part of a run."""
 
     def __init__(self, steps: int) -> None:
-        """Measure a run of so many steps."""
+        """Start to measure a run of a number of steps."""
         self._steps, self._before = steps // _PARTS, 0.0
         self.times: list[float] = []
 
@@ -63,7 +63,7 @@ class Parts:
 
 @contextmanager
 def timed(times: list[float]) -> Iterator[None]:
-    """Note how long every checkpoint takes [s]."""
+    """Record the time of every checkpoint [s]."""
     written: Any = Checkpoints._write
 
     def counted(self: Checkpoints, run: Run) -> None:

@@ -1,4 +1,4 @@
-"""What several of these scripts measure and print alike."""
+"""Measurements and options that several of these scripts share."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ ONE = "--one"
 
 
 def options(text: str) -> argparse.ArgumentParser:
-    """The options of a script that repeats runs of some steps, from its docstring."""
+    """Make the parser of a script that repeats runs, with its docstring."""
     parser = argparse.ArgumentParser(description=text.splitlines()[0])
     parser.add_argument("--steps", type=int, default=5000)
     parser.add_argument("--repetitions", type=int, default=9)
@@ -38,12 +38,12 @@ def options(text: str) -> argparse.ArgumentParser:
 
 
 def python() -> str:
-    """What runs here, and on what."""
+    """Version of Python, and the type of machine."""
     return f"{platform.python_implementation()} {platform.python_version()}, {platform.machine()}"
 
 
 def timed(function: Callable[[], object], clock: Callable[[], float] = perf_counter) -> float:
-    """Seconds of one call: of the wall clock, or of another."""
+    """Seconds of one call, by the wall clock or another one."""
     start = clock()
     function()
     return clock() - start
@@ -72,15 +72,15 @@ def resident() -> float:
 
 
 def found_apart(script: str, *arguments: object, limit: float) -> Any:
-    """What a script finds in a process of its own, which may not end well.
+    """Run a script in a separate process, which may crash, and return its result.
 
     Args:
-        script: that tells it, by :func:`tell`, where :data:`ONE` is its first argument.
-        arguments: that follow.
-        limit: for all of it [s].
+        script: which prints its result by :func:`tell` if its first argument is :data:`ONE`.
+        arguments: further arguments.
+        limit: time limit [s].
 
     Raises:
-        RuntimeError: it found nothing; the text says why.
+        RuntimeError: there is no result; the text has the reason.
 
     """
     command = [sys.executable, script, ONE, *map(str, arguments)]
@@ -97,12 +97,12 @@ def found_apart(script: str, *arguments: object, limit: float) -> Any:
 
 
 def tell(found: object) -> None:
-    """Tell the process that waits what was found, past whatever FMUs and hosts print."""
+    """Print a result for the waiting process, distinct from the output of FMUs and hosts."""
     print(f"\n{ONE}{json.dumps(found)}", flush=True)
 
 
 def ecos() -> Any:
-    """The package of ecos, whose libtbb the wheel tbb puts where the loader does not look."""
+    """Import ecos, with libtbb, which the wheel tbb installs outside the loader's path."""
     for library in Path(sys.prefix, "lib").glob("libtbb.so.12"):
         ctypes.CDLL(str(library), mode=ctypes.RTLD_GLOBAL)
     import ecospy  # noqa: PLC0415
@@ -111,7 +111,7 @@ def ecos() -> Any:
 
 
 def libcosim() -> Any:
-    """The executions of libcosim, which says no more than what goes wrong."""
+    """Import libcosim's CosimExecution, and log only errors."""
     from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level  # noqa: PLC0415
 

@@ -17,7 +17,7 @@ _EVERY = 1000
 
 
 def main() -> None:
-    """Run, and print."""
+    """Run and print."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("n", type=int, nargs="?", default=10 * _EVERY, help="default: %(default)s")
     n = parser.parse_args().n

@@ -1,12 +1,12 @@
-"""FMUs of other tools beside ours: `python benchmarks/others.py [TOOL]...`.
+"""Comparison with FMUs of other tools: `python benchmarks/others.py [TOOL]...`.
 
 Every tool that is installed makes an FMU of the same small vehicle: thrust commanded in, position
-and speed out, a lag of the thruster that is no output, one explicit step of 20 ms. Ours is
-AuvPlant, the whole vehicle, in both kinds. Printed are what is in the FMUs, what fmpy finds wrong
-with them, and what they do when they are run; times are the shortest of several.
+and speed out, an internal lag of the thruster, one explicit step of 20 ms. AuvPlant, in both kinds,
+is a whole vehicle. The output has the contents of the FMUs, the problems that fmpy finds, and their
+behaviour in a run; times are the shortest of several.
 
-`pip install unifmu casadi grpcio 'protobuf<3.21'` installs what is compared; what is not installed
-is skipped. CasADi's FMU is for model exchange, so the step is this script's own, in Python.
+`pip install unifmu casadi grpcio 'protobuf<3.21'` installs the tools; those that are missing are
+skipped. CasADi's FMU is for model exchange, so this script makes the step, in Python.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ INSTANCES = 20
 #: Steps before a state is saved, and after it.
 BEFORE, AFTER = 50, 50
 
-#: Seconds for all that is done with one FMU, and between two builds of it: times in a zip are even.
+#: Time limit for one FMU [s], and the time between two builds: a zip rounds times to 2 s.
 PATIENCE, APART = 300, 2.1
 
 #: First argument of this script where it runs one FMU, which may end the process.
@@ -127,7 +127,7 @@ _UNIFMU_DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def pythonfmu(folder: Path) -> Path:
-    """The vehicle as PythonFMU builds it."""
+    """Build the vehicle by PythonFMU."""
     from pythonfmu import FmuBuilder  # noqa: PLC0415
 
     script = folder / "surge.py"
@@ -149,11 +149,11 @@ def unifmu(folder: Path) -> Path:
 
 
 def casadi(folder: Path) -> Path:
-    """The vehicle as CasADi exports it."""
+    """Export the vehicle by CasADi."""
     from casadi import DaeBuilder  # noqa: PLC0415
 
     here = Path.cwd()
-    os.chdir(folder)  # where CasADi writes
+    os.chdir(folder)  # CasADi writes here
     try:
         model = DaeBuilder("Surge")
         tau = model.add("tau", "input", {"start": 0.0})
@@ -242,11 +242,11 @@ class CoSimulation:
         return bytes(self.slave.serializeFMUstate(state))
 
     def restore(self, state: bytes) -> None:
-        """Go on from it."""
+        """Continue from a saved state."""
         self.slave.setFMUstate(self.slave.deSerializeFMUstate(state))
 
     def end(self) -> None:
-        """Free the instance, and leave the library where it is."""
+        """Free the instance, but keep the library."""
         self.slave.fmi2FreeInstance(self.slave.component)
 
 
@@ -286,7 +286,7 @@ class ModelExchange:
         self._component = ctypes.c_void_p(self.model.component)
 
     def step(self, k: int, tau: float) -> int:
-        """The worst status of what makes a step."""
+        """Worst status of the calls of a step."""
         self.value[0] = tau
         c, x, dx = self._component, self.x, self.dx
         size = ctypes.c_size_t
@@ -304,12 +304,12 @@ class ModelExchange:
         )
 
     def end(self) -> None:
-        """Free the instance, and leave the library where it is."""
+        """Free the instance, but keep the library."""
         self.model.fmi3FreeInstance(self.model.component)
 
 
 def run(fmu: Path) -> None:
-    """Run one FMU and tell what was found, a JSON object a line."""
+    """Run one FMU and print the results, one JSON object per line."""
     os.set_inheritable(int(os.environ[_PIPE]), False)  # an FMU may start processes that stay
     with TemporaryDirectory(prefix="others") as folder:
         fmpy.extract(fmu, folder)
@@ -342,12 +342,12 @@ def run(fmu: Path) -> None:
 
 
 def say(**found: object) -> None:
-    """One line to the parent, past whatever the FMU prints."""
+    """Print one line for the parent process, distinct from the FMU's output."""
     os.write(int(os.environ[_PIPE]), json.dumps(found).encode() + b"\n")
 
 
 def empty_calls() -> float:
-    """Seconds of three calls through ctypes that do next to nothing."""
+    """Seconds of three empty calls through ctypes."""
     compare, one, size = ctypes.CDLL(None).memcmp, (ctypes.c_double * 1)(), ctypes.c_size_t(0)
     start = perf_counter()
     for _ in range(STEPS):
@@ -368,7 +368,7 @@ def a_step(one: CoSimulation | ModelExchange) -> float:
 
 
 def state(one: CoSimulation, other: CoSimulation) -> str:
-    """Whether a run goes on from a saved state as it went on before."""
+    """True if a run continues from a saved state with the same numbers."""
     if not one.offers_state:
         return "not offered"
 
@@ -391,7 +391,7 @@ def state(one: CoSimulation, other: CoSimulation) -> str:
 
 
 def after_nan(one: CoSimulation | ModelExchange) -> str:
-    """What becomes of a thrust that is no number."""
+    """Effect of a thrust that is NaN."""
     one.step(0, 1.0)
     status = one.step(1, math.nan)
     one.step(2, 1.0)
@@ -401,7 +401,7 @@ def after_nan(one: CoSimulation | ModelExchange) -> str:
 
 
 def inside(fmu: Path) -> dict[str, object]:
-    """What is in the archive."""
+    """Names in the archive."""
     with ZipFile(fmu) as archive:
         names = archive.namelist()
         binaries = [n for n in names if n.startswith("binaries/") and not n.endswith("/")]
@@ -419,7 +419,7 @@ def inside(fmu: Path) -> dict[str, object]:
 
 
 def needed(library: str) -> list[str]:
-    """What a shared library is linked against, and Python where it takes its symbols."""
+    """Libraries that a shared library needs, and Python if it takes symbols from it."""
     dynamic = subprocess.run(
         ["readelf", "-d", library], capture_output=True, text=True, check=True, timeout=60
     )
@@ -436,13 +436,13 @@ def needed(library: str) -> list[str]:
 
 
 def problems(fmu: Path) -> int:
-    """How many things fmpy finds wrong with it."""
+    """Number of problems that fmpy finds."""
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         return len(validate_fmu(str(fmu)))
 
 
 def differences(first: Path, second: Path) -> str:
-    """How two builds differ."""
+    """Difference of two builds."""
     if first.read_bytes() == second.read_bytes():
         return "same bytes"
     with ZipFile(first) as a, ZipFile(second) as b:
@@ -452,7 +452,7 @@ def differences(first: Path, second: Path) -> str:
 
 
 def measured(fmu: Path) -> dict[str, object]:
-    """What a process finds that runs it; the FMU may end that process."""
+    """Results of a process that runs the FMU, which may end that process."""
     reading, writing = os.pipe()
     # UniFMU starts `python3`, which must be the one with its packages.
     path = f"{sysconfig.get_path('scripts')}{os.pathsep}{os.environ['PATH']}"

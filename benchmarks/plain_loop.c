@@ -1,12 +1,12 @@
 /* The run of Fig. 4 as one plain program: the anchor of benchmarks/plain_loop.py.
  *
- * The vehicle, the reference, the disturbance and the proposed controller stand in one loop, with
+ * The loop consists of the vehicle, the reference, the disturbance and the proposed controller, in
  * the order of operations of auv_fmu.loop.closed_loop, so that it gives the same numbers. There are
  * no ports, checks, choices or noise. Numbers in brackets are the equations of the paper.
  */
 #include <math.h>
 
-#define NU 0.2785 /* of Lemma 2 */
+#define NU 0.2785 /* constant of Lemma 2 */
 
 struct parameters {
     double m11, m22, m33, m44, m55, m66; /* masses and inertias with added ones */
@@ -14,22 +14,22 @@ struct parameters {
     double righting_pitch, righting_roll;
     double ell; /* distance of the control point */
     double tau_min[3], tau_max[3];
-    double A_f, A_d, omega_d; /* of the disturbance */
-    double K1[3], K2[3], lambda, k_d, gamma, sigma, theta_0[4], eps_t, gate; /* of the controller */
-    double tau_d[3], eta_d0[5], nu_d0[5]; /* of the reference */
-    double eta0[6], nu0[6]; /* of the vehicle, at the start */
+    double A_f, A_d, omega_d; /* disturbance */
+    double K1[3], K2[3], lambda, k_d, gamma, sigma, theta_0[4], eps_t, gate; /* controller */
+    double tau_d[3], eta_d0[5], nu_d0[5]; /* reference */
+    double eta0[6], nu0[6]; /* vehicle at the start */
     double h; /* time step */
 };
 
 struct state {
-    double position[3], quaternion[4], nu[6]; /* of the vehicle */
-    double y_hat[3], dy_hat_o[3], theta_hat[4]; /* of the controller */
-    double position_d[3], theta_d, psi_d, nu_d[5]; /* of the reference */
+    double position[3], quaternion[4], nu[6]; /* vehicle */
+    double y_hat[3], dy_hat_o[3], theta_hat[4]; /* controller */
+    double position_d[3], theta_d, psi_d, nu_d[5]; /* reference */
     double square[3]; /* integral of the square of tau */
     double error; /* |y - y_d| */
 };
 
-/* Section 4.1. Whoever loads this program may change them, so they are no constants. */
+/* Section 4.1. Variables instead of constants, because a program that loads this may change them. */
 struct parameters parameters = {
     25.0, 17.5, 30.0, 22.5, 22.5, 15.0,
     30.0, 30.0, 30.0, 20.0, 20.0, 20.0,

@@ -1,11 +1,11 @@
-"""What a step of Fig. 4 costs in C written by hand: `python benchmarks/plain_loop.py`.
+"""Time of a step of Fig. 4 in C written by hand: `python benchmarks/plain_loop.py`.
 
-`plain_loop.c` is the loop and nothing else, for the least that a program of it takes. It is built
-in several ways and compared with the batch engine, which makes all indices too. All make the same
-run without noise, in turn, again and again. Of each the shortest processor's time counts, less the
-shortest of a run of one step, and its ratio to that of the fastest build.
+`plain_loop.c` is only the loop, the fastest program for it. It is built in several ways and
+compared with the batch engine, which also computes all indices. All make the same run without
+noise, in turns. Each row has the shortest processor time, less the time of a run of one step, and
+its ratio to the fastest build.
 
-Without another option zig compiles for the processor that it runs on.
+By default zig compiles for the processor that it runs on.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ _BUILDS = {
 
 
 class State(ctypes.Structure):
-    """What the program ends with, in its order."""
+    """Final values of the program, in order."""
 
     _fields_ = (
         ("position", 3 * ctypes.c_double),
@@ -65,7 +65,7 @@ class State(ctypes.Structure):
 
 
 def built(command: tuple[str, ...], path: Path) -> ctypes.CDLL:
-    """The program as a library, which a command compiles into a file."""
+    """Library that a command compiles from the program."""
     subprocess.run([*command, "-shared", "-fPIC", SOURCE, "-o", path, "-lm"], check=True)
     library = ctypes.CDLL(str(path))
     library.run.argtypes = (ctypes.c_long, ctypes.POINTER(State))
@@ -81,14 +81,14 @@ def run(library: ctypes.CDLL, steps: int) -> State:
 
 
 def builds(folder: Path) -> Iterator[tuple[str, Callable[[int], object]]]:
-    """The builds for which there is a compiler, each as what makes a run of some steps."""
+    """Functions that make a run of some steps, for each build with a compiler."""
     for name, command in _BUILDS.items():
         if find_spec("ziglang") if "ziglang" in command else shutil.which(command[0]):
             yield name, partial(run, built(command, folder / f"{name.replace(' ', '')}.so"))
 
 
 def batch() -> Callable[[int], object]:
-    """The batch engine, as what makes a run of some steps."""
+    """Function that makes a run of some steps by the batch engine."""
     engine = BatchEngine({"fig4": load("fig4")})
 
     def make(steps: int) -> None:
@@ -101,11 +101,11 @@ def batch() -> Callable[[int], object]:
 def step_times(
     rows: dict[str, Callable[[int], object]], steps: int, repetitions: int
 ) -> dict[str, float]:
-    """Microseconds of a step of each, without what a run begins with: of the shortest runs."""
+    """Microseconds of a step of each, in the shortest runs, without their start."""
     once, whole = dict.fromkeys(rows, inf), dict.fromkeys(rows, inf)
     for _ in range(repetitions):
         for name, make in rows.items():
-            make(1)  # what the others have left in the processor's caches is not its own
+            make(1)  # warm the caches of the processor
             once[name] = min(once[name], timed(partial(make, 1), process_time))
             whole[name] = min(whole[name], timed(partial(make, steps + 1), process_time))
     return {name: 1e6 * (whole[name] - once[name]) / steps for name in rows}

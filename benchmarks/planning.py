@@ -1,13 +1,13 @@
-"""What a large system costs before its first step: `python benchmarks/planning.py`.
+"""Cost of a large system before its first step: `python benchmarks/planning.py`.
 
-Chains, stars, and neighbours that feed one another, of one small FMU in C that does not say what
-its outputs depend on. Ours is the default order, which has to be found; libcosim and ecos step all
-at once. Every run is a process of its own, which is ended after a stated time. Printed are
+Chains, stars, and neighbours that feed one another, of one small FMU in C that does not declare the
+dependencies of its outputs. Our master steps in its default order; libcosim and ecos step all at
+once. Every run is a separate process with a time limit. The columns are
 
-- `load`: from the file to what can be run,
+- `load`: reading of the file,
 - `start`: plan, instances, initialisation and first exchange of values,
-- `10 steps`: these; libcosim starts in its first step, of which what the others take is taken off,
-- `memory`: the most that the process has had.
+- `10 steps`: ten steps; libcosim starts in its first step, whose excess time is subtracted,
+- `memory`: largest memory of the process.
 """
 
 from __future__ import annotations
@@ -99,17 +99,17 @@ _DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 
 
 def chain(n: int) -> list[tuple[int, int, str]]:
-    """Each feeds the next."""
+    """A chain: each component feeds the next."""
     return [(i, i + 1, "u") for i in range(n - 1)]
 
 
 def star(n: int) -> list[tuple[int, int, str]]:
-    """The first feeds all others."""
+    """A star: the first component feeds all others."""
     return [(0, i, "u") for i in range(1, n)]
 
 
 def neighbours(n: int) -> list[tuple[int, int, str]]:
-    """Each feeds the next, and that one feeds it."""
+    """Neighbours: each component feeds the next, and the next feeds it."""
     return chain(n) + [(i + 1, i, "v") for i in range(n - 1)]
 
 
@@ -117,7 +117,7 @@ SHAPES = {shape.__name__: shape for shape in (chain, star, neighbours)}
 
 
 def build(folder: Path, responds: bool) -> Path:
-    """The FMU."""
+    """Build the FMU."""
     compiler = shutil.which("cc")
     if compiler is None:
         raise SystemExit("planning.py needs a C compiler, cc")
@@ -133,7 +133,7 @@ def build(folder: Path, responds: bool) -> Path:
 
 
 def write(fmu: Path, shape: str, n: int, folder: Path) -> None:
-    """A system in the formats of all hosts."""
+    """Write a system in the formats of all hosts."""
     small = read_component("a", fmu)
     names = [f"a{i}" for i in range(n)]
     connections = [
@@ -147,7 +147,7 @@ def write(fmu: Path, shape: str, n: int, folder: Path) -> None:
 
 
 class _First(Table):
-    """A table that knows when the first exchange was over."""
+    """A table with the time of the first exchange."""
 
     at = 0.0
 
@@ -157,7 +157,7 @@ class _First(Table):
 
 
 def ours(folder: Path) -> tuple[float, float, float]:
-    """Our master."""
+    """Run by our master."""
     begun = perf_counter()
     system = load(str(folder / "large.ssp"))
     read = perf_counter()
@@ -171,7 +171,7 @@ def ours(folder: Path) -> tuple[float, float, float]:
 
 
 def in_libcosim(folder: Path) -> tuple[float, float, float]:
-    """libcosim."""
+    """Run by libcosim."""
     tool = measuring.libcosim()
     begun = perf_counter()
     execution = tool.from_osp_config_file(osp_path=str(folder))
@@ -186,7 +186,7 @@ def in_libcosim(folder: Path) -> tuple[float, float, float]:
 
 
 def in_ecos(folder: Path) -> tuple[float, float, float]:
-    """ecos."""
+    """Run by ecos."""
     tool = measuring.ecos()
     begun = perf_counter()
     with tool.EcosSimulation(step_size=STEP, ssp_path=str(folder / "large.ssp")) as simulation:
@@ -205,7 +205,7 @@ HOSTS: dict[str, Callable[[Path], tuple[float, float, float]]] = {
 
 
 def measured(host: str, folder: Path, limit: float) -> str:
-    """What a process finds that makes one run, as the end of a line of the table."""
+    """Results of a process that makes one run, as the end of a line of the table."""
     try:
         *times, memory = measuring.found_apart(__file__, host, folder, limit=limit)
     except RuntimeError as error:

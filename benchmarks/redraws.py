@@ -1,4 +1,4 @@
-"""How long redraws of the live page take: `python benchmarks/redraws.py`.
+"""Time of a redraw of the live page: `python benchmarks/redraws.py`.
 
 Moves the slider of eps_t on the page of Fig. 4 once for each picture of the screen, in Chromium
 without a window or a graphics card. Each move runs both controllers and draws.

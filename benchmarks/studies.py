@@ -1,12 +1,12 @@
-"""What the runs of a study cost, and what very many would: `python benchmarks/studies.py`.
+"""Cost of the runs of a study, and of 100 million of them: `python benchmarks/studies.py`.
 
 Runs of Fig. 4 from random starts are made by one worker process and by two, alternately, with each
-engine. Then runs that cost nothing go the same way, in blocks as they are and in blocks of one run:
-what is left are the costs of the process that sends runs out and keeps what comes back, for a run
-and for a block. From these, the last lines say what a large study needs on a large cluster.
+engine. Then empty runs are made in the same way, in normal blocks and in blocks of one run: their
+time is spent in the process that sends runs and stores results, for a run and for a block. From
+these, the last lines extrapolate to a large study on a large cluster.
 
-Processor time is that of the worker processes, and stands a busy machine; the gain of two workers
-is in wall-clock time, and wants both cores.
+Processor time is measured in the worker processes, so a busy machine does not matter; the gain of
+two workers is in wall-clock time, and needs both cores.
 """
 
 from __future__ import annotations
@@ -37,16 +37,16 @@ from orchestrator.vehicle.indices import index_columns
 
 SCENARIO = "fig4"
 
-#: Blocks that each worker makes before anything is timed: by then FMUs are loaded, programs
-#: compiled, and blocks as long as they shall be.
+#: Blocks that each worker makes before the measurement, to load FMUs, compile programs, and settle
+#: the length of blocks.
 _WARM = 3
 
-#: Runs that tell roughly how long one takes.
+#: Runs for a rough estimate of the time of one.
 _TRIED = 5
 
 
 class Timed(NamedTuple):
-    """An engine that says how much processor time each run takes, and nothing else of it."""
+    """An engine whose only result is the processor time of each run."""
 
     engine: Engine
     digest: str = "timed"
@@ -66,20 +66,20 @@ class Idle(NamedTuple):
     digest: str = "idle"
 
     def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
-        """Make nothing."""
+        """Return nothing."""
         for point in points:
             yield Outcome(point.number, dict.fromkeys(index_columns(), 0.1 * point.number))
 
 
 class Cost(NamedTuple):
-    """What runs take, each [s]."""
+    """Time of each run [s]."""
 
     processor: float
     wall: float
 
 
 def cost(engine: Engine, points: Iterable[Point], workers: int) -> Cost:
-    """What runs take when some processes make them."""
+    """Time of runs that several processes make."""
     with making_runs(Timed(engine), iter(points), workers=workers) as blocks:
         for _ in islice(blocks, _WARM * workers):
             pass
@@ -120,7 +120,7 @@ def keeping(n: int) -> tuple[float, float, float]:
 
 
 def block(n: int) -> float:
-    """Seconds that a block takes to get there and back when there is nothing to do."""
+    """Seconds of an empty block, from sending to its result."""
     space = starts(n, 1.0)
     with (
         patch.object(blocks_module, "_MOST_RUNS", 1),

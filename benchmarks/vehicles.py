@@ -1,16 +1,16 @@
 """Many vehicles in one process: `python benchmarks/vehicles.py`.
 
-Each vehicle is the closed loop of Fig. 4, four FMUs; nothing connects one with another. Every run
-is a process of its own, whose rows are dropped. Printed are
+Each vehicle is the closed loop of Fig. 4, four FMUs, without connections to others. Every run is a
+separate process, whose rows are dropped. The columns are
 
-- `load`: from the scenario to the system,
+- `load`: reading of the scenario,
 - `start`: plan, instances, initialisation and first exchange of values,
-- `step`: of one vehicle, in the compiled loop and in the Python loop, in time of the processor,
-- `memory`: that each vehicle adds to the process until its first step; the first one has what a run
-  before it has left.
+- `step`: processor time of one vehicle in the compiled loop and in the Python loop,
+- `memory`: growth of the process for each vehicle until its first step; for one vehicle, after an
+  earlier run.
 
-Below them the step of ten vehicles in other hosts, and of one, from the native kind; the time of a
-host is not that of its reading of outputs.
+Below them are the steps of ten vehicles, and of one, in other hosts, for the native kind and
+without a read of outputs.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from orchestrator.runs.preparation import load, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
 
-#: How many vehicles, by the kind of their FMUs.
+#: Numbers of vehicles, by the kind of their FMUs.
 SIZES: dict[KindName, tuple[int, ...]] = {NATIVE: (1, 10, 100, 1000), PYTHON: (1, 10, 100)}
 
 #: Steps of all vehicles together, and the fewest of each.
@@ -44,12 +44,12 @@ HOSTS_BESIDE, FEW, HOST_STEPS = ("libcosim-ssp", "ecos"), (1, 10), 50_000
 LOOPS: tuple[Plan.Loop, ...] = ("compiled", "python")
 COMPILED = LOOPS[0]
 
-#: How long a process may take [s].
+#: Time limit for a process [s].
 LIMIT = 600.0
 
 
 class Watch:
-    """An observer that drops the rows, and knows when the first exchange was over."""
+    """An observer that drops the rows, and records the time of the first exchange."""
 
     began, memory, spent, ended = 0.0, 0.0, 0.0, 0.0
 
@@ -67,7 +67,7 @@ class Watch:
 
 def found(n: int, kind: KindName, loop: Plan.Loop, steps: int) -> list[float]:
     """Seconds to load and to start, microseconds of a vehicle's step, and its memory [MB]."""
-    # What the first system takes, and the libraries, is there before.
+    # Memory of the first system, and of the libraries.
     prepare(Scenario("warm"), load("fig4", kind), Request(stop_time=STEP, loop=loop)).run([Watch()])
     gc.collect()
     before, begun, watch = measuring.resident(), perf_counter(), Watch()
@@ -82,7 +82,7 @@ def found(n: int, kind: KindName, loop: Plan.Loop, steps: int) -> list[float]:
 
 
 def in_hosts(n: int) -> str:
-    """The step of a vehicle in other hosts."""
+    """Time of a step of a vehicle in other hosts."""
     steps = HOST_STEPS // n
     verdicts = compare(load({"vehicles": n}, NATIVE), HOSTS_BESIDE, steps, STEP)
     return "".join(

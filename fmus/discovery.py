@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import re
 import uuid
 import zipfile
 from collections.abc import Mapping
@@ -18,6 +19,11 @@ from xml.etree import ElementTree
 from fmus.kinds import CONTAINED
 from fmus.ports.definition import Definition, define
 from orchestrator.machine.identity import package_folder
+
+#: The marks in a `page.md` between which `tools/pages.py` writes the tables of ports.
+FILLED = ("<!-- filled: ports -->", "<!-- / -->")
+
+_PORTS = re.compile(rf"{FILLED[0]}.*?{FILLED[1]}\n*", re.DOTALL)
 
 #: The folder of a component that holds its reference results.
 REFERENCE = "reference"
@@ -77,10 +83,10 @@ class Source(NamedTuple):
 
     @property
     def page(self) -> str:
-        """Its author's description in Markdown, from `page.md` or the docstring."""
+        """Author's description in Markdown without ports, from `page.md` or the docstring."""
         page = self.folder / "page.md"
         if self.root is None and page.is_file():
-            return page.read_text(encoding="utf-8").strip()
+            return _PORTS.sub("", page.read_text(encoding="utf-8")).strip()
         text = cleandoc(import_module(self.module).__doc__ or "")
         return f"# {self.name}\n\n{text}".strip()
 

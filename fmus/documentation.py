@@ -1,7 +1,7 @@
 """Pages of the components, from their `page.md` and their declared ports.
 
 Each FMU contains its page as HTML, together with sections that all FMUs share; `tools/pages.py`
-writes the pages into docs/reference/components.
+writes the tables of ports into each `page.md`.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from string import Template
 from markdown_it import MarkdownIt
 
 from auv_fmu.language.variable import POSITIVE
-from fmus.discovery import Source, related_files
+from fmus.discovery import FILLED, Source, related_files
 from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.definition import Model
 from fmus.ports.description import TYPES
@@ -99,12 +99,12 @@ If the FMU has a parameter `h_max`, a longer step is split evenly, with held inp
 
 
 def component_page(source: Source) -> str:
-    """Write the page of a component in Markdown: its description with its ports.
+    """Write the text of a component's `page.md`, with the tables of its ports.
 
     Sections that all components share are in docs/reference/components/README.md.
     """
-    page = source.page.replace("](../../docs/", "](../../")
-    return _joined(_parted(page, _tables(source.definition.ports, {})))
+    begin, end = FILLED
+    return _joined(_parted(source.page, (begin, *_tables(source.definition.ports, {}), end)))
 
 
 def page_of(model: Model, head: Sequence[str], fmi: str = "2", more: Sequence[str] = ()) -> str:

@@ -1,6 +1,6 @@
-"""Print the house: modules with their first lines, and rooms.
+"""Print all modules with their first lines, and the sizes of subpackages.
 
-`python tools/house.py --rooms` leaves the modules out.
+`python tools/house.py --rooms` prints the sizes only.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ PACKAGES = ("src/auv_fmu", "fmus", "orchestrator")
 
 
 class Module(NamedTuple):
-    """A module: its path in the repository, its first line, and how long it is."""
+    """A module: its path in the repository, its first line, and its length."""
 
     path: Path
     first_line: str
@@ -28,7 +28,7 @@ class Module(NamedTuple):
 
     @property
     def room(self) -> str:
-        """The folder below its package that it is in."""
+        """Subpackage of the module."""
         package = next(folder for folder in PACKAGES if self.path.is_relative_to(folder))
         below = self.path.relative_to(package).parts[:-1]
         return "/".join((package, *below[:1]))
@@ -44,7 +44,7 @@ def modules(package: str) -> Iterator[Module]:
 
 
 def main() -> None:
-    """Print it."""
+    """Print the modules and subpackages."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rooms", action="store_true", help="leave the modules out")
     is_short: bool = parser.parse_args().rooms

@@ -1,13 +1,13 @@
-"""The numbers of pages that take minutes to compute: `python tools/page_numbers.py NAME`.
+"""Print numbers of pages that take minutes to compute: `python tools/page_numbers.py NAME`.
 
 =============  ====================================================================================
-`accuracy`     the tables of docs/explanation/accuracy.md: what the step does to the scenarios
-`noise`        what 1 mm of noise does: README, reproduction.md, and remarks of scenarios
-`seeds`        what random seas, links and noise do: remarks of scenarios, and the pages on them
+`accuracy`     the tables of docs/explanation/accuracy.md: effect of the step on the scenarios
+`noise`        effect of 1 mm of noise: README, reproduction.md, and remarks of scenarios
+`seeds`        effect of random seas, links and noise: remarks of scenarios, and their pages
 `remus`        docs/explanation/remus.md: changes of `remus` and `remus-pd`, and steady turns
-`networks`     docs/tutorials/your-own-component.md: how far networks are from onnxruntime
+`networks`     docs/tutorials/your-own-component.md: deviation of networks from onnxruntime
 `gains`        the best gains under a limit of the commands, in docs/explanation/ready-studies.md
-`studies`      the numbers below the figures of that page, of studies that were made in FOLDER
+`studies`      the numbers below the figures of that page, from finished studies in folders
 `benchmarks`   runs the commands of the files in benchmarks/results, and writes their output there
 =============  ====================================================================================
 
@@ -82,7 +82,7 @@ QUIET: Values = {STD: 0.0}
 
 
 def system_of(name: str) -> System:
-    """The system of a scenario, or of the PD controller beside it: `path-pd` is that of `path`."""
+    """System of a scenario, or of its PD controller: `path-pd` belongs to `path`."""
     if name in names():
         return load_scenario(name)[1]
     request = Request(name.removesuffix("-pd"))
@@ -107,7 +107,7 @@ class Runs:
     def table(
         self, name: str, values: Values, step: float = STEP, stop_time: float | None = None
     ) -> Table:
-        """All rows of a run."""
+        """Rows of a run."""
         return self._engine.table(self.point(name, values, step, stop_time))
 
     def indices(
@@ -130,7 +130,7 @@ def size_of(made: Table, loop: Loop = STANDARD) -> np.ndarray:
 
 
 def band(values: Iterable[float], digits: int = 3) -> str:
-    """Median, and what 5 and 95 % stay below."""
+    """Median, with the quantiles of 5 and 95 %."""
     low, median, high = np.quantile([*values], (0.05, 0.5, 0.95))
     return f"{median:,.{digits}g} ({low:,.{digits}g} to {high:,.{digits}g})"
 
@@ -140,9 +140,9 @@ def show(head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
     print(f"\n{table(head, rows)}", flush=True)
 
 
-# What the step does to the scenarios
+# Effect of the step on the scenarios
 
-#: Scenarios; the path of one depends on the last bits of its start, so its numbers are bands.
+#: Scenarios, with a chaotic one, whose numbers are bands.
 SCENARIOS = ("fig4", "fig5", "fig5-pd", "fig6", "fig6-pd", "fig7a", "fig7b", "fig7c")
 CHAOTIC = "fig6-pd"
 REGULAR = [name for name in SCENARIOS if name != CHAOTIC]
@@ -154,7 +154,7 @@ NO_FRICTION: Values = {**QUIET, "disturbance.A_f": 0.0}
 WAYS: Sequence[tuple[Values, float]] = [*((QUIET, h) for h in (STEP, *SMALLER)), (RK4, STEP)]
 HEADS = [*(f"{1e3 * h:g} ms" for h in (STEP, *SMALLER)), "20 ms, `rk4`"]
 
-#: Indices by the names of the tables: their names in metrics.json, and their parts.
+#: Indices in metrics.json, by their names in the tables.
 INDICES = {
     f"{short} {part}": f"{name}.{part}"
     for short, name, parts in (
@@ -164,7 +164,7 @@ INDICES = {
     for part in parts
 }  # fmt: skip
 
-#: What changes by a larger share depends on the step.
+#: An index that changes by a larger share depends on the step.
 MUCH = 0.05
 
 
@@ -243,7 +243,7 @@ def accuracy() -> None:
 
 
 def free_body() -> None:
-    """Energy of a body that nothing drives or brakes, after 20 s over that at the start."""
+    """Change of the energy of a free body in 20 s."""
     zeros = [*(f"d{i}{i}" for i in range(1, 7)), *(f"tau.{k}" for k in ACTUATORS)]
     free = {f"plant.{name}": 0.0 for name in (*zeros, "righting.pitch", "righting.roll")}
     free |= {"plant.nu0.u": 1.0, "plant.nu0.q": 0.3, "plant.nu0.r": 0.5}
@@ -261,9 +261,9 @@ def free_body() -> None:
 
 
 def continuous(system: System, stop: float) -> np.ndarray:
-    """The path of the loop whose controller is not sampled, every 20 ms [m].
+    """Path of the loop in continuous time, every 20 ms [m].
 
-    Planner and controller go on by Euler's scheme, whose step over its length is the rate.
+    An Euler step of planner and controller, divided by its length, is their rate.
     """
     from scipy.integrate import solve_ivp  # noqa: PLC0415
 
@@ -272,7 +272,7 @@ def continuous(system: System, stop: float) -> np.ndarray:
     begun = closed_loop.begin(setting, (0.0, 0.0, 0.0))
     control_begun = begun.controller_state
     if isinstance(control_begun, ControllerState):
-        # Its steps are all of one length, which so does not change.
+        # All steps have one length, so that it does not change.
         control_begun = control_begun._replace(h=h)
     start = begun.vehicles.plant, begun.vehicles.planner, control_begun
 
@@ -328,7 +328,7 @@ def flat(state: Any) -> list[float]:
 
 
 def like(state: Any, numbers: Iterator[float]) -> Any:
-    """The state of the same form with other numbers."""
+    """State of the same form with other numbers."""
     if isinstance(state, float):
         return next(numbers)
     parts = [like(part, numbers) for part in state]
@@ -341,7 +341,7 @@ def apart(path: np.ndarray, other: np.ndarray) -> float:
 
 
 def distances(path: np.ndarray, other: np.ndarray) -> str:
-    """The largest, and the root of the mean square."""
+    """Largest distance and root mean square of two paths."""
     rms = np.sqrt(np.mean(np.sum((path - other) ** 2, axis=1)))
     return f"{length(apart(path, other))}; {length(rms)}"
 
@@ -363,9 +363,9 @@ def between(values: Sequence[float] | np.ndarray) -> str:
     return " to ".join(dict.fromkeys(number(end) for end in (min(values), max(values))))
 
 
-# What 1 mm of noise does
+# Effect of 1 mm of noise
 
-#: Draws of a run; of a long one; of one with events, which the FMUs make.
+#: Numbers of draws: of a run, of a long run, and of a run with events, by the FMUs.
 MANY, SOME, FEW = 1000, 30, 100
 FIGURES = ("fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c", "fig5-pd", "fig6-pd")
 FAULTS = ("fault-thruster", "fault-sensor", "current-step")
@@ -461,9 +461,9 @@ def fault_measures(made: Table) -> dict[str, float]:
     }
 
 
-# What random seas, links and noise do
+# Effect of random seas, links and noise
 
-#: Over which times the largest errors count [s].
+#: Spans of time for the largest errors [s].
 SPANS: Mapping[str, Sequence[tuple[float, float]]] = {
     "sea": [(0, 25), (60, 101)],
     "formation-v": [(25, 121)],
@@ -472,7 +472,7 @@ SPANS: Mapping[str, Sequence[tuple[float, float]]] = {
     "remus": [(120, 281)],
 }
 
-#: Runs without what is random.
+#: Runs without randomness.
 EVEN: Mapping[str, tuple[str, Values]] = {
     "sea": (
         "still water",
@@ -483,7 +483,7 @@ EVEN: Mapping[str, tuple[str, Values]] = {
 
 
 def seed_numbers(scenario: str, made: Table, loops: Sequence[Loop]) -> dict[str, float]:
-    """The numbers of a run: of several vehicles the largest, of distances the smallest."""
+    """Numbers of a run: the largest of several vehicles, the smallest of distances."""
     sizes, found = np.array([size_of(made, loop) for loop in loops]), {}
     for start, end in SPANS[scenario]:
         here = (made.time >= start) & (made.time < end)
@@ -509,7 +509,7 @@ def seed_numbers(scenario: str, made: Table, loops: Sequence[Loop]) -> dict[str,
 def over_seeds(
     scenario: str, pd: bool, n: int, values: Values | None = None
 ) -> dict[str, np.ndarray]:
-    """The numbers of the run with the scenario's own seeds, and of n with others."""
+    """Numbers of the run with the scenario's own seeds, and of n runs with others."""
     system = system_of(scenario + "-pd" * pd)
     seeds = [
         f"{component}.{port}"
@@ -543,12 +543,12 @@ def seeds(*scenarios: str, n: int = 60) -> None:
 
 
 def ell(value: float) -> dict[str, Any]:
-    """Another control point, which begins where the reference does."""
+    """Changes for another control point, at the start of the reference."""
     known = {f"{name}.ell": value for name in ("plant", "controller", "planner")}
     return {**known, "plant.eta0.x": -value}
 
 
-#: What is changed, as the page calls it.
+#: Changes, in the words of the page.
 CHANGES: Mapping[str, Values] = {
     "nothing": {},
     "current of 0.3 m/s across the first leg": {"plant.current.y": 0.3},
@@ -606,7 +606,7 @@ def remus() -> None:
 
 
 def remus_numbers(scenario: str, changes: Values) -> str:
-    """A line of numbers about a run."""
+    """Numbers of a run in a line."""
     result = simulate(scenario, changes)
     if result.failure is not None:
         return result.failure
@@ -647,7 +647,7 @@ def steady_turn(speed: float) -> tuple[float, float, float]:
 
 
 def prestero_turn(speed: float) -> tuple[float, float, float]:
-    """The same with the coefficients of Prestero (2001) for sway and yaw, at the same angle."""
+    """The same as :func:`steady_turn` with the coefficients of Prestero (2001) for sway and yaw."""
     m, v, r = 30.48, 0.0, 0.0
     u, rudder = speed, -Parameters().tail.delta_max
     for _ in range(20_000):
@@ -662,7 +662,7 @@ def prestero_turn(speed: float) -> tuple[float, float, float]:
 
 # Networks
 
-#: Neurons of the layers, of which the first are inputs; seeds of a shape, and inputs of each.
+#: Neurons of the layers (the first are inputs); seeds of a shape, and inputs of each.
 SHAPES = ((4, 8, 2), (1, 300, 1), (3, 300, 2), (12, 64, 64, 6), (16, 200, 200, 4))
 NETWORKS, INPUTS = 20, 10
 FUNCTIONS: dict[str, Callable[[Any], Any]] = {"Tanh": np.tanh, "Relu": lambda z: np.maximum(z, 0.0)}
@@ -760,7 +760,7 @@ def gains(n: int = 1) -> None:
 
 # Studies
 
-#: What column names begin with that tells nothing apart.
+#: Prefixes of column names that do not distinguish columns.
 COMPONENT = re.compile(r"^(auv\*\.)?(plant|controller|disturbance|link)\.")
 
 
@@ -779,13 +779,13 @@ def bound(column: Any) -> str:
 
 
 def rank(one: Any, other: Any) -> str:
-    """Spearman's correlation of two columns, and its standard error; it sees no U shapes."""
+    """Spearman's correlation of two columns, and its standard error; it misses U shapes."""
     from scipy.stats import spearmanr  # noqa: PLC0415
 
     return f"{spearmanr(one, other).statistic:.3f} ± {(len(one) - 1) ** -0.5:.3f} (n = {len(one)})"
 
 
-#: The numbers that a line may ask for, from the columns that it names.
+#: Statistics of columns, by the first word of a line.
 STATISTICS: Mapping[str, Callable[..., str]] = {
     "n": lambda column: str(len(column)),
     "median": lambda column: f"{column.median():.5g} (n = {len(column)})",
@@ -805,7 +805,7 @@ def queries(study: str) -> dict[str, Any]:
 
 
 def lines_of(study: str) -> list[str]:
-    """The lines for a study, with each alternative written out."""
+    """Lines for a study, with the alternatives expanded."""
     found: list[str] = []
     for line in queries(study)["lines"].strip().splitlines():
         parts = re.split(r"\{(.*?)\}", line)
@@ -815,14 +815,14 @@ def lines_of(study: str) -> list[str]:
 
 
 def parsed(line: str) -> tuple[str, list[str], list[str], str]:
-    """The statistic of a line, its columns, what tells groups apart, and the query."""
+    """Statistic of a line, its columns, the columns that group it, and the query."""
     what, _, where = line.partition(" | ")
     columns, by = (part.split() for part in what.partition(" by ")[::2])
     return columns[0], columns[1:] or ["run"], by, where
 
 
 def prepared(study: str, runs: Any) -> Any:
-    """The runs with short names, and with the columns that are made of others."""
+    """Runs with short names, and with computed columns."""
     runs = runs.rename(columns=lambda name: COMPONENT.sub("", name))
     runs = runs.rename(columns=lambda name: re.sub(r"\W+", "_", name).strip("_"))
     runs = runs.rename(columns={"lambda": "lam"})
@@ -830,7 +830,7 @@ def prepared(study: str, runs: Any) -> Any:
         runs["proposed"], runs["PD"] = runs.scenario == "fig5", runs.scenario == "fig5-pd"
     runs["failed"] = runs.failure.fillna("") != ""
     runs["ended"] = runs.failure.str.extract(r" t = (\S+) s", expand=False).astype(float)
-    # Of several vehicles, the largest.
+    # The largest of several vehicles.
     runs["late_error"] = runs.filter(regex="(^|_)late_error$").max(axis=1)
     runs["lost"] = ~(runs.late_error <= 1.0)
     runs["saturated"] = runs.filter(like="saturated_fraction").max(axis=1) > 0.0
@@ -843,7 +843,7 @@ def prepared(study: str, runs: Any) -> Any:
         first = runs.groupby(["step", "noise_std", "way"]).l2_effort_u.transform("first")
         runs["effort_ratio"] = runs.l2_effort_u / first
     for amplitude, other in (("A_f", "A_d"), ("A_d", "A_f")) if study == "robustness" else ():
-        # Whether it is kept with this disturbance, and with all weaker ones on the line.
+        # True if the reference is kept with this disturbance and all weaker ones on the line.
         line = runs.sort_values(amplitude).groupby(
             ["scenario", "step", "noise_std", "omega_d", other]
         )
@@ -891,7 +891,7 @@ def benchmarks(*chosen: str) -> int:
 
 
 def is_written(file: Path) -> bool:
-    """Run the command of a file and write its output there; False: it failed."""
+    """Run the command of a file and write its output there; return False if it fails."""
     command, where = command_of(file), machine()
     arguments = [sys.executable, *shlex.split(command)]
     done = subprocess.run(
@@ -912,7 +912,7 @@ def command_of(file: Path) -> str:
 
 
 def machine() -> str:
-    """The processor that this runs on, how many cores of it, and how busy they are."""
+    """Processor of this machine, with the number of cores and the load."""
     file = Path("/proc/cpuinfo")
     facts = file.read_text(encoding="utf-8") if file.is_file() else ""
     listed = re.search(r"^model name\s*: (.+)$", facts, re.MULTILINE)
@@ -921,7 +921,7 @@ def machine() -> str:
     return f"{processor}, {os.cpu_count()} cores{load}"
 
 
-#: What there is, by name.
+#: Functions by name.
 PAGES: Mapping[str, Callable[..., int | None]] = {
     one.__name__: one
     for one in (accuracy, noise, seeds, remus, networks, gains, studies, benchmarks)

@@ -1,22 +1,24 @@
-"""Fill in what the pages of docs/ take from the code, and write the schemas for editors.
+"""Fill in the parts of pages that come from the code, and write the schemas for editors.
 
-`python tools/pages.py` writes each file anew that is not as it would be written; a test holds them
-against it. Pages are written by hand except what stands between `<!-- filled: NAME -->` and
-`<!-- / -->`, which this replaces. The pages of the components and `docs/schemas` are written whole.
+`python tools/pages.py` rewrites every file that is out of date; a test fails while there is one.
+Pages are written by hand, except the parts between `<!-- filled: NAME -->` and `<!-- / -->`.
+`docs/schemas` is generated as a whole.
 
-`parts` has the long texts. The other tools compute what takes minutes: `page_numbers.py` prints the
-numbers of many pages, and `printed_table.py` those of docs/explanation/table.md. `pictures.py`
-draws the figures of studies and scenarios, and `reference.py` writes `reference`.
+Numbers that take minutes to compute are printed by other tools: `page_numbers.py` for many pages,
+`printed_table.py` for docs/explanation/table.md. `pictures.py` draws the figures of studies and
+scenarios, and `reference.py` writes `reference`.
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
 import json
 import re
 import textwrap
-from collections.abc import Iterable, Mapping
-from functools import cache
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import zip_longest
 from math import cbrt, radians, sqrt, tan
 from pathlib import Path
 from typing import Any
@@ -27,16 +29,19 @@ from auv_fmu.paper.control_point import ELL
 from auv_fmu.paper.output_feedback import Gains
 from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.paper.vehicle import Vehicle
-from auv_fmu.proof.attraction import Theorem, ball, theorem
+from auv_fmu.proof.attraction import ball, theorem
 from auv_fmu.proof.gain_conditions import coupling
-from fmus.discovery import components, source_of
+from fmus.discovery import FILLED, components, source_of
 from fmus.documentation import component_page
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
-from orchestrator.figures.run_figures import FIGURES
+from orchestrator.commands.main import COMMANDS, parser
+from orchestrator.figures.run_figures import FIGURES, FLEET
+from orchestrator.figures.study_values import Values
 from orchestrator.figures.style import printed_unit
 from orchestrator.machine.schema import TomlTable, entries
+from orchestrator.machine.texts import flatten
 from orchestrator.paper.page import table
-from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_file import (
     CompareTable,
     EventTable,
@@ -45,48 +50,136 @@ from orchestrator.runs.scenario_file import (
     ScenarioFile,
 )
 from orchestrator.runs.wiring import read_wiring
-from orchestrator.studies.study import FigureTable, Study, StudyFile, read_study, ready_studies
+from orchestrator.studies.study import (
+    LABELS,
+    FigureTable,
+    Study,
+    StudyFile,
+    read_study,
+    ready_studies,
+)
 from orchestrator.vehicle.indices import INDICES, Index
 from orchestrator.vehicle.proof import stated
-from parts.command_line import command_line
-from parts.examples import examples
-from parts.gallery import PICTURES, figures, gallery, picture, seen
 
-DOCS = Path(__file__).parents[1] / "docs"
-COMPONENTS = DOCS / "reference" / "components"
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+EXAMPLES = ROOT / "examples"
+
+#: Folder of the pictures in docs/; pictures of studies are in its subfolder `studies`.
+PICTURES = "images"
 
 _PLACE = re.compile(r"(<!-- filled: (\w+) -->).*?(<!-- / -->)", re.DOTALL)
 
+#: Examples in docs/reference/examples.md by group, and the parts of the language that each shows.
+_GROUPS = {
+    "controllers": {
+        "lqr": "sampled, no state, `derive` of parameters",
+        "pid": "sampled, tunable parameters, `check`",
+        "waypoint_guidance": "matrix as parameter, `derive`, internal steps",
+    },
+    "estimators": {
+        "complementary_filter": "`atan2`, several inputs, exact step",
+        "extended_kalman_filter": "sampled, `solve`, refusal, `replaced`",
+        "kalman_filter": "sampled, matrices as state, `derive`",
+        "luenberger_observer": "vectors, Runge-Kutta, internal steps",
+        "notch_filter": "sampled, filter memory, sampling period",
+    },
+    "plants": {
+        "battery": "`interpolate`, `derive`, `feedthrough=()`",
+        "cart_pendulum": "`solve`, Runge-Kutta, internal steps",
+        "dc_motor": "vectors, Runge-Kutta, internal steps",
+        "engine_map": "`interpolate`, `derive`, `feedthrough`",
+        "lag_with_delay": "delay line, noise, `seed`",
+        "quarter_car": "`solve`, `derive` of parameters, implicit rule",
+        "rate_limiter": "`min` and `max`, tunable parameters, hysteresis",
+        "water_tank": "`derive`, internal steps, Boolean output",
+    },
+    "logic": {
+        "state_machine": "`IntEnum`, `_replace`, Boolean input",
+        "thermostat": "`IntEnum` as parameter, counter, exact step",
+    },
+    "pythonfmu": {
+        "resistor": "no state, feedthrough, tunable parameter",
+        "sine_network": "constant matrix, `tanh`, no state",
+        "step_response": "no state, use of `t`, formula",
+    },
+    "reference_fmus": {
+        "bouncing_ball": "events, Boolean state, internal steps",
+        "dahlquist": "internal steps, stability, exact solution",
+        "stair": "Integer output, `while`, use of `t`",
+        "state_space": "matrices as parameters, vector ports, internal steps",
+        "van_der_pol": "internal steps, tunable parameter, Euler's rule",
+    },
+}
+
+#: Contents of the pictures of scenarios, by kind of figure.
+_SEEN = {
+    "tracking": "path, tracking errors, commands and estimated parameters",
+    "comparison": "both paths, commands and tracking errors",
+    FLEET: "paths, tracking errors and distances of all vehicles",
+    "comparison-errors": "tracking errors of both controllers",
+    "open-loop-surge": "path, surge velocity and acceleration",
+    "open-loop-turn": "path, velocities and accelerations",
+}
+
 
 def files() -> dict[Path, str]:
-    """The text of every file that this writes, as it is to be."""
+    """Texts of all files, by path."""
     filled = {
         "explanation/paper.md": paper(),
         "explanation/language.md": {"mathematics": mathematics()},
-        "gallery.md": gallery(),
-        "reference/command-line.md": {"commands": command_line()},
+        "gallery.md": {"scenarios": gallery()},
+        "reference/command-line.md": command_line(),
         "reference/components/README.md": {"components": bundle()},
         "reference/examples.md": examples(),
         "explanation/ready-studies.md": {
             "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
         },
         "reference/scenario-files.md": scenarios(),
-        "how-to/studies.md": {"ready": ready()},
         "reference/study-files.md": studies(),
     }
     return {
         **{DOCS / name: filled_in(DOCS / name, values) for name, values in filled.items()},
-        **{COMPONENTS / f"{name}.md": component_page(source_of(name)) for name in components()},
+        **component_pages(),
         DOCS / "schemas" / "scenario.json": _json(ScenarioFile),
         DOCS / "schemas" / "study.json": _json(StudyFile),
     }
 
 
+def page_of(component: str) -> Path:
+    """Page of a component."""
+    return ROOT.joinpath(*components()[component].split(".")[:-1], "page.md")
+
+
+def component_pages() -> dict[Path, str]:
+    """Pages of the components, on which parameters that another page has are only named."""
+    first = ("AuvPlant", "ObserverController", "Remus100")
+    pages, owners = {}, dict[str, str]()
+    for name in sorted(components(), key=lambda name: (name not in first, name)):
+        lines, shared = [], defaultdict[str, list[str]](list)
+        for line in component_page(source_of(name)).splitlines():
+            # Only the rows of parameters have five cells.
+            if (
+                line.startswith("| `")
+                and line.count(" | ") == 4
+                and owners.setdefault(line, name) != name
+            ):
+                shared[owners[line]].append(line.split(" | ")[0].removeprefix("| "))
+                continue
+            if line == FILLED[1]:
+                for other, same in shared.items():
+                    link = _linked(other, other, "../..")
+                    lines.append(f"As in {link}, with the same start values: {', '.join(same)}.\n")
+            lines.append(line)
+        pages[page_of(name)] = "\n".join(lines) + "\n"
+    return pages
+
+
 def filled_in(page: Path, values: Mapping[str, str]) -> str:
-    """The text of a page with values in their places; values of several lines are paragraphs.
+    """Text of a page with its parts filled in; values of several lines become paragraphs.
 
     Raises:
-        ValueError: the page has no place for a value, or a place for none.
+        ValueError: the page has no part for a value, or no value for a part.
 
     """
     text = page.read_text(encoding="utf-8")
@@ -103,15 +196,13 @@ def filled_in(page: Path, values: Mapping[str, str]) -> str:
 
 
 def scenarios() -> dict[str, str]:
-    """Tables of docs/reference/scenario-files.md."""
+    """Parts of docs/reference/scenario-files.md."""
     wiring = read_wiring()
     drawn = {read_scenario(name).figure: name for name in sorted(names(), reverse=True)}
     figures = (
         f"`{kind}`" + (f" (as `{drawn[kind]}`)" if kind in drawn else "") for kind in FIGURES
     )
-    fmus = (
-        (f"`{name}`", f"[{fmu}](components/{fmu}.md)") for name, fmu in wiring["components"].items()
-    )
+    fmus = ((f"`{name}`", _linked(fmu, fmu, "../..")) for name, fmu in wiring["components"].items())
     wires = ((f"`{target}`", f"`{source}`") for target, source in wiring["wires"].items() if source)
     return {
         "entries": _entries(ScenarioFile),
@@ -119,36 +210,38 @@ def scenarios() -> dict[str, str]:
         "path": _entries(PathTable),
         "events": _entries(EventTable),
         "inputs": _entries(InputsTable),
-        "components": _table("component", "FMU", rows=fmus),
-        "wires": _table("inputs", "are fed by", rows=wires),
+        "components": table(("component", "FMU"), [*fmus]),
+        "wires": table(("inputs", "are fed by"), [*wires]),
         "figures": ", ".join(figures),
     }
 
 
 def mathematics() -> str:
-    """The functions and constants of docs/explanation/language.md."""
+    """Functions and constants in docs/explanation/language.md."""
     *names, last = (f"`{name}`" for name in (*FUNCTIONS, *sorted(CONSTANTS)))
     return textwrap.fill(f"{', '.join(names)} and {last}.", 98)
 
 
 def bundle() -> str:
-    """The table of docs/reference/components/README.md."""
-    rows = ((f"[`{name}`]({name}.md)", source_of(name).definition.summary) for name in components())
-    return _table("FMU", "what it is", rows=rows)
+    """Table in docs/reference/components/README.md."""
+    rows = (
+        (_linked(f"`{name}`", name, "../../.."), source_of(name).definition.summary)
+        for name in components()
+    )
+    return table(("FMU", "what it is"), [*rows])
 
 
-def ready() -> str:
-    """The table of docs/how-to/studies.md."""
-    studies = ((f"`{name}`", read_study(name).title) for name in ready_studies())
-    return _table("`auv-fmu sweep`", "what it asks", rows=studies)
+def _linked(text: str, component: str, root: str) -> str:
+    """Link to the page of a component; `root` is the relative path of the repository's root."""
+    return f"[{text}]({root}/{page_of(component).relative_to(ROOT).as_posix()})"
 
 
 def studies() -> dict[str, str]:
-    """Tables of docs/reference/study-files.md."""
+    """Parts of docs/reference/study-files.md."""
     return {
         "entries": _entries(StudyFile),
         "figures": _entries(FigureTable),
-        "indices": _table("index", "meaning", rows=map(_index, INDICES)),
+        "indices": table(("index", "meaning"), [*map(_index, INDICES)]),
     }
 
 
@@ -160,17 +253,20 @@ def _index(index: Index) -> tuple[str, str]:
 
 
 def _section(study: Study) -> str:
+    """A study in docs/explanation/ready-studies.md."""
+    settings = dict(study.parameters)
+    if study.stop_time is not None and not study.stop_time.per:
+        settings["stop_time"] = study.stop_time.base
+    stated = [study.scenario[0], *(f"{key}={value}" for key, value in settings.items())]
+    # The live page does not accept stars in names.
+    live = "" if any("*" in one for one in stated) else f" <!-- live: {'&'.join(stated)} -->"
     pictures = (
-        f"![{_words(study, figure)}](../{PICTURES}/{picture(study, figure)})"
-        for figure in figures(study)
+        f"![{seen(study, name)}](../{PICTURES}/studies/{study.name}-{name}.png)"
+        for name in study.figures
+        if name != LABELS
     )
-    command = f"`auv-fmu sweep {study.name}`"
+    command = f"`auv-fmu sweep {study.name}`{live}"
     return "\n\n".join([f"## {study.title}", command, *pictures, study.remark.strip()])
-
-
-def _words(study: Study, figure: str) -> str:
-    """What one sees on a figure, below the title of its study."""
-    return seen(study, figure).removeprefix(f"{study.title}: ")
 
 
 def _entries(schema: type[TomlTable]) -> str:
@@ -178,21 +274,17 @@ def _entries(schema: type[TomlTable]) -> str:
         (f"`{key}`", *(cell.replace("|", r"\|") for cell in declared))
         for key, declared in entries(schema).items()
     )
-    return _table("entry", "value", "meaning", "without it", rows=rows)
-
-
-def _table(*header: str, rows: Iterable[tuple[str, ...]]) -> str:
-    return table(header, list(rows))
+    return table(("entry", "value", "meaning", "without it"), [*rows])
 
 
 def _json(table: type[TomlTable]) -> str:
-    """The JSON schema of a file, from which an editor completes and explains its entries."""
+    """JSON schema of a file, from which editors complete and explain its entries."""
     schema = table.model_json_schema(schema_generator=_WithoutNull)
     for part in (schema, *schema.get("$defs", {}).values()):
         for declared in part.get("properties", {}).values():
             declared.pop("example", None)
             if declared.get("additionalProperties") is True:
-                # Versions of pydantic differ in whether they say so.
+                # Only some versions of pydantic write this default.
                 del declared["additionalProperties"]
             if default := declared.pop("without", ""):
                 declared["description"] += f" Without it: {default}."
@@ -201,7 +293,7 @@ def _json(table: type[TomlTable]) -> str:
 
 
 class _WithoutNull(GenerateJsonSchema):
-    """Leaves out defaults, of which TOML has none to write, and titles that repeat the key."""
+    """Omit defaults (TOML cannot write None) and titles that repeat the key."""
 
     def default_schema(self, schema: Any) -> dict[str, Any]:
         return self.generate_inner(schema["schema"])
@@ -210,15 +302,10 @@ class _WithoutNull(GenerateJsonSchema):
         return False
 
 
-@cache
-def of_the_paper() -> Theorem:
-    """The theorem for section 4.1."""
-    return theorem(Vehicle(), ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
-
-
 def paper() -> dict[str, str]:
-    """Numbers of docs/explanation/paper.md."""
-    vehicle, found = Vehicle(), of_the_paper()
+    """Numbers in docs/explanation/paper.md."""
+    vehicle = Vehicle()
+    found = theorem(vehicle, ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
     k, there = coupling(vehicle, ELL), found.bounds.lambda_d2
     speed, power = found.speed_of_any_gains, found.alpha_1_of_any_gains
     turning = vehicle.m55 / ELL**3
@@ -253,8 +340,178 @@ def paper() -> dict[str, str]:
     }
 
 
+def command_line() -> dict[str, str]:
+    """Parts of docs/reference/command-line.md: common arguments, and a section for each command."""
+    top = commands(parser(COMMANDS))
+    leaves = [leaf for command in top.values() for leaf in commands(command).values() or [command]]
+    rows = Counter(_row(one) for leaf in leaves for one in _arguments(leaf))
+    common = {row for row, uses in rows.items() if uses > 1}
+    sections = (
+        section
+        for name, command in top.items()
+        for section in _sections(f"auv-fmu {name}", COMMANDS[name][1], command, common)
+    )
+    return {
+        "common": table(("argument", "meaning"), sorted(common, key=lambda row: row[0].lower())),
+        "commands": "\n\n".join(sections),
+    }
+
+
+def commands(group: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """Commands of a parser, by name."""
+    return {
+        name: command
+        for action in group._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for name, command in action.choices.items()
+    }
+
+
+def _arguments(command: argparse.ArgumentParser) -> list[argparse.Action]:
+    """Arguments of a command: first those by position, then options."""
+    ignored = argparse._HelpAction, argparse._SubParsersAction
+    actions = [action for action in command._actions if not isinstance(action, ignored)]
+    return sorted(actions, key=lambda action: bool(action.option_strings))
+
+
+def _sections(
+    name: str,
+    meaning: str,
+    command: argparse.ArgumentParser,
+    common: set[tuple[str, str]],
+    level: int = 2,
+) -> Iterator[str]:
+    below, actions = commands(command), _arguments(command)
+    yield f"{'#' * level} `{name}`"
+    yield command.description or f"{meaning[0].upper()}{meaning[1:]}."
+    if not below:
+        yield f"```text\n{_usage(name, actions)}\n```"
+    if command.epilog and actions:
+        _, _, example = command.epilog.partition("Example: ")
+        yield f"Example: `{example}`"
+    if rows := [row for row in map(_row, actions) if row not in common]:
+        yield table(("argument", "meaning"), rows)
+    texts = {
+        choice.dest: choice.help or ""
+        for action in command._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for choice in action._choices_actions
+    }
+    for one, subcommand in below.items():
+        yield from _sections(f"{name} {one}", texts[one], subcommand, common, level + 1)
+
+
+def _usage(name: str, actions: Sequence[argparse.Action]) -> str:
+    # Lines break only between arguments.
+    parts = (_part(action).replace(" ", "\0") for action in actions)
+    lines = textwrap.wrap(
+        " ".join((name.replace(" ", "\0"), *parts)),
+        80,
+        subsequent_indent=" " * (len(name) + 1),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return "\n".join(lines).replace("\0", " ")
+
+
+def _part(action: argparse.Action) -> str:
+    """An argument in a usage."""
+    written = " ".join(filter(None, (*action.option_strings[-1:], _value(action))))
+    is_optional = action.option_strings or action.nargs in ("?", "*")
+    repeats = action.nargs in ("*", "+") or isinstance(action, argparse._AppendAction)
+    return (f"[{written}]" if is_optional else written) + ("..." if repeats else "")
+
+
+def _row(action: argparse.Action) -> tuple[str, str]:
+    """An argument in a table."""
+    written = " ".join(filter(None, (*action.option_strings, _value(action))))
+    text = (action.help or "").replace("%%", "%")
+    if action.default not in (None, False, [], argparse.SUPPRESS) and "default:" not in text:
+        text = f"{text}; default: {action.default}"
+    return f"`{written}`".replace("|", r"\|"), text.replace("|", r"\|")
+
+
+def _value(action: argparse.Action) -> str:
+    if action.nargs == 0:
+        return ""
+    if isinstance(action.metavar, str):
+        return action.metavar
+    return "|".join(map(str, action.choices)) if action.choices else action.dest.upper()
+
+
+def examples() -> dict[str, str]:
+    """Parts of docs/reference/examples.md: a table for each group.
+
+    Raises:
+        ValueError: the groups and the folder of the examples differ.
+
+    """
+    listed = [name for group in _GROUPS.values() for name in group]
+    if sorted(listed) != [
+        p.stem for p in sorted(EXAMPLES.glob("*/*.py")) if p.stem == p.parent.name
+    ]:
+        raise ValueError("the groups and the folder of the examples differ")
+    return {
+        group: table(
+            ("example", "what it is", "shows"),
+            [(_link(name), _first_line(name), shown) for name, shown in members.items()],
+        )
+        for group, members in _GROUPS.items()
+    }
+
+
+def _link(name: str) -> str:
+    return f"[`{name}`](../../examples/{name}/{name}.py)"
+
+
+def _first_line(name: str) -> str:
+    """First line of an example's docstring."""
+    text = (EXAMPLES / name / f"{name}.py").read_text(encoding="utf-8")
+    return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
+
+
+def gallery() -> str:
+    """The scenarios in docs/gallery.md, two in a row."""
+    cells = [*map(_scenario, sorted(map(read_scenario, names()), key=_place))]
+    pairs = zip_longest(cells[::2], cells[1::2], fillvalue="")
+    return "\n".join(["| | |", "|---|---|", *(f"| {one} | {other} |" for one, other in pairs)])
+
+
+def seen(study: Study, figure: str) -> str:
+    """Content of a study's figure in words."""
+    declared = FigureTable.model_validate(study.figures[figure])
+    labels = study.figures.get(LABELS, {})
+
+    def words(columns: str | list[str] | None) -> str:
+        named = [columns] if isinstance(columns, str) else columns or []
+        called = (labels.get(one) or Values({}).label(one) for one in named)
+        return ", ".join(re.sub(r" \[.*\]$|[|]|\$.*\$, ", "", text) for text in called)
+
+    x, y, show = declared.x, declared.y, declared.show
+    text = {
+        "bands": f"{words(show)} over {words(x)}",
+        "maps": f"{words(show)} as colours over {words(x)} and {words(y)}",
+        "front": f"{words(y)} against {words(x)}, and the runs that no other run beats in both",
+        "influence": f"how much the values that vary move {words(show)}",
+    }[declared.kind]
+    only = "".join(f", {words(key)} {value}" for key, value in flatten(declared.where or {}))
+    return text + only
+
+
+def _scenario(scenario: Scenario) -> str:
+    name, file = scenario.name, f"{PICTURES}/{scenario.name}.png"
+    shown = f"[![{_SEEN[FLEET if scenario.vehicles else scenario.figure]}]({file})]({file})"
+    return f"{shown}<br>**{scenario.title}**<br>`auv-fmu run {name}` <!-- live: {name} -->"
+
+
+def _place(scenario: Scenario) -> tuple[bool, bool, str]:
+    """Sort key: the paper's scenarios first, and among these the open loops last."""
+    name = scenario.name
+    return not name.startswith("fig"), name.startswith("fig3"), name
+
+
 def main() -> None:
-    """Write the files that are not as they are to be."""
+    """Rewrite the files that are out of date."""
     argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     for path, text in files().items():
         if not path.exists() or path.read_text(encoding="utf-8") != text:

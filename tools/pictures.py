@@ -1,8 +1,8 @@
-"""The pictures of the scenarios, `python tools/pictures.py`, and of studies that were made.
+"""Draw the pictures of docs/images: `python tools/pictures.py [FOLDER]...`.
 
-`python tools/pictures.py results/noise ...` draws the figures of the ready studies in these folders
-once more. All pictures are smaller than the ones that a run leaves; the studies' keep all their
-colours, because a palette would take colours out of their scales.
+Without arguments it runs and draws all scenarios; with folders, such as `results/noise`, it draws
+the figures of the ready studies in them. Pictures are smaller than in the results of a run. Studies
+keep all their colours, because a palette would leave out colours of their scales.
 """
 
 from __future__ import annotations
@@ -22,8 +22,7 @@ from orchestrator.runs.scenario import names
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study import read_figures, read_study
-from pages import DOCS
-from parts.gallery import PICTURES
+from pages import DOCS, PICTURES
 
 #: Pictures are about 1,000 pixels wide.
 _DPI = 140

@@ -51,15 +51,15 @@ END_TIMES = np.arange(20.0, 201.0)
 #: Starts, moved by at most 1e-6 m, by which variants of five degrees of freedom are compared, and
 #: others that are shown, with these quantiles; and a band that is narrower, relatively, is not.
 SEARCHED, SHOWN, QUANTILES, MOVED, SAME = range(31), range(31, 131), (0.1, 0.5, 0.9), 1e-6, 0.01
-#: How near counts as near, in parts of a printed number.
+#: Tolerances, relative to a printed number.
 TOLERANCES = (0.1, 0.25, 0.5)
 
 
 class Option(NamedTuple):
-    """One way to fill in what the paper leaves open, and what is printed that it contradicts."""
+    """One option of an open point, and the printed statement that it contradicts."""
 
     text: str
-    parameters: Mapping[str, Any] = {}  # nobody changes it
+    parameters: Mapping[str, Any] = {}  # never changed
     against: str = ""
     order: Order | None = None
 
@@ -68,7 +68,7 @@ _WAVES, _SIGN = Disturbance(), "(2): the sign of tau_w"
 _FORWARD, _BACKWARD = {"disturbance.A_f": -_WAVES.A_f}, {"disturbance.A_d": -_WAVES.A_d}
 Choices = Mapping[str, Sequence[Option]]
 
-#: Choices that runs depend on; the scenarios have the first option of each.
+#: Choices for runs; the scenarios have the first option of each.
 CHOICES: Choices = {
     "eps_t of the proposed controller": [
         Option("10, as for PD"), Option("1, as for Fig. 4", {"controller.eps_t": 1.0}),
@@ -115,9 +115,9 @@ CHOICES: Choices = {
     ],
 }  # fmt: skip
 OF_PROPOSED = ("eps_t of the proposed controller", "observer")
-#: The vehicle of (1) and (2): from 30 m away it passes the pole of (1), where the last bits decide.
+#: The vehicle of (1) and (2). From 30 m away it passes the pole of (1), and is chaotic.
 FIVE = Option("five degrees of freedom", {"plant.roll": False}, "4.1: 6-DOF")
-#: Choices that are left when a run is done, apart from T_f: the signal, and the reading of it.
+#: Choices for the evaluation of a run, apart from T_f: the signal, and its reading.
 SIGNALS = [Option("applied"), Option("commanded")]
 ORDERS = [
     Option("(u, q, r)"), Option("(u, r, q)", against="below (6): tau_a = (tau_u, tau_q, tau_r)"),
@@ -133,7 +133,7 @@ def six_of(made: Table) -> np.ndarray:
     """L2 norms and e_f of a run, with axes for SIGNALS and END_TIMES before them."""
     if made.time[-1] < END_TIMES[-1] - STEP:
         return np.full((2, len(END_TIMES), 6), np.nan)
-    # Half a step is more than times are rounded by.
+    # Half a step is more than the rounding errors of times.
     ends = np.searchsorted(made.time, END_TIMES - 0.5 * STEP)
     begins = np.searchsorted(made.time, made.time[ends] - LAST)
     error, h = np.abs(errors(made)), np.diff(made.time)[:, np.newaxis]
@@ -181,15 +181,15 @@ def medians(engine: BatchEngine, runs: Sequence[Point]) -> list[tuple[np.ndarray
 
 
 def single(engine: BatchEngine, runs: Sequence[Point]) -> list[tuple[np.ndarray, Approach | None]]:
-    """The six of runs, and their ways to the reference; a task for a worker."""
+    """The six of runs, and their approach to the reference; a task for a worker."""
     return [(six_of(made), approach_of(made)) for made in map(engine.table, runs)]
 
 
 class Variants:
-    """All combinations of some choices, and what they give."""
+    """All combinations of some choices, with their numbers."""
 
     def __init__(self, crew: Workers, choices: Choices, task: Any, size: int) -> None:
-        """Make the runs, so many at a time, by a task."""
+        """Make the runs by a task, `size` at a time."""
         self.chosen = [dict(zip(choices, some, strict=True)) for some in product(*choices.values())]
         self.runs = [[run_of(name, chosen) for name in SCENARIOS] for chosen in self.chosen]
         points = list({str(run): run for pair in self.runs for run in pair}.values())
@@ -215,44 +215,36 @@ class Variants:
         allowed = np.outer(self.flags, [not ORDERS[order].against for order, _ in READINGS])
         self.consistent = np.where(allowed[:, np.newaxis, np.newaxis], self.scores, np.inf)
 
-    def arrived(self, name: str, is_consistent: bool) -> np.ndarray:
-        """Flags of the combinations that have come to the reference by T_f."""
+    def arrived(self, name: str) -> np.ndarray:
+        """Flags of consistent variants that have come to the reference by T_f."""
         arrived = (self.twelve[..., SIX[name]][..., 3:] <= REACHED).all(axis=-1)
-        return np.asarray(
-            arrived & self.flags[:, np.newaxis, np.newaxis] if is_consistent else arrived
-        )
+        return np.asarray(arrived & self.flags[:, np.newaxis, np.newaxis])
 
-    def span(self, name: str, formula: int | None) -> np.ndarray:
-        """Least and largest six of what contradicts nothing, by a formula; None: of everything."""
-        arrived = self.arrived(name, formula is not None)
-        readings = READINGS if formula is None else [(0, formula)]
-        ends = [
-            (read.min(axis=0), read.max(axis=0))
-            for reading in readings
-            for read in [as_read(self.twelve, *reading)[..., SIX[name]][arrived]]
-        ]
-        return np.array([np.min(ends, axis=0)[0], np.max(ends, axis=0)[1]])
+    def span(self, name: str, formula: int) -> np.ndarray:
+        """Least and largest six of consistent variants, by a formula."""
+        read = as_read(self.twelve, 0, formula)[..., SIX[name]][self.arrived(name)]
+        return np.array([read.min(axis=0), read.max(axis=0)])
 
     def near(self, tolerance: float) -> int:
-        """The largest number of the twelve that are within a tolerance at once."""
+        """Largest number of the twelve that are within a tolerance at once."""
         away = (np.abs(as_read(self.twelve, *reading) / PRINTED - 1.0) for reading in READINGS)
         return max(int((one <= tolerance).sum(axis=-1).max()) for one in away)
 
     def efforts_within(self, formula: int) -> float:
-        """The least distance of all six efforts at once, of what is consistent and has arrived."""
+        """Least distance of all six efforts at once, over consistent variants that have arrived."""
         away = np.abs(as_read(self.twelve, 0, formula) / PRINTED - 1.0)
         farthest = away[..., [0, 1, 2, 6, 7, 8]].max(axis=-1)
-        arrived = np.logical_and(*(self.arrived(name, True) for name in SCENARIOS))
+        arrived = np.logical_and(*(self.arrived(name) for name in SCENARIOS))
         return float(farthest[arrived].min())
 
 
 def digits(value: float) -> str:
-    """Three digits, without an exponent for the efforts of wild runs."""
+    """Three digits, without an exponent for large efforts."""
     return f"{value:.3g}" if value < 1000.0 else f"{value:,.0f}"
 
 
 def print_variants(crew: Workers, engine: BatchEngine, six: Variants, five: Variants) -> None:
-    """Print ours and the nearest beside what is printed, and how they are read."""
+    """Print our numbers, the nearest ones and the printed ones, and their options."""
     shown = {
         "ours": (six, (0, 0, int(np.flatnonzero(END_TIMES == 100.0)[0]), 0)),
         "nearest": (six, np.unravel_index(six.consistent.argmin(), six.scores.shape)),
@@ -286,7 +278,7 @@ def print_variants(crew: Workers, engine: BatchEngine, six: Variants, five: Vari
         around = held.scores[i, signal, [max(end - 10, 0), min(end + 10, 180)], reading]
         print(f"{title}: {'; '.join(words)}; T_f = {END_TIMES[end]:g} s, the score 10 s before and "
               f"after {numbers(around)}")  # fmt: skip
-    spans = np.concatenate([[six.span(n, f) for f in (0, 1, None)] for n in SCENARIOS], axis=-1)
+    spans = np.concatenate([[six.span(n, f) for f in (0, 1)] for n in SCENARIOS], axis=-1)
     rows = []
     *lines, total, factor = zip(*columns, strict=True)
     for title, printed, cells, ends in zip(TITLES, PRINTED, lines, spans.T, strict=True):
@@ -295,13 +287,13 @@ def print_variants(crew: Workers, engine: BatchEngine, six: Variants, five: Vari
             for low, high in ends.T
         ]
         rows.append([title, f"{printed:g}", *cells, *ranges])
-    rows += [["score", "", *total, "", "", ""], ["factor", "", *factor, "", "", ""]]
-    heads = ["range, L2 norm", "range, sum without the step", "range of all"]
+    rows += [["score", "", *total, "", ""], ["factor", "", *factor, "", ""]]
+    heads = ["range, L2 norm", "range, sum without the step"]
     print(f"\n{table(['', 'printed', *shown, *heads], rows)}\n")
 
 
 def print_rest(six: Variants, five: Variants) -> None:
-    """Print how near numbers are at once, what impulses ask for, and the scores of all options."""
+    """Print numbers that are near at once, bounds from impulses, and the scores of all options."""
     for title, held in (("six", six), ("five", five)):
         print(
             f"{title} degrees of freedom, {held.scores.size:,} variants: at most "
@@ -338,6 +330,8 @@ def print_rest(six: Variants, five: Variants) -> None:
     for k, (choice, some) in enumerate({"order": ORDERS, "formula": FORMULAS}.items()):
         for i, one in enumerate(some):
             add(f"{choice} of the efforts", one, (..., [reading[k] == i for reading in READINGS]))
+    for k, row in reversed([*enumerate(rows)][1:]):
+        row[0] *= row[0] != rows[k - 1][0]
     print("\n" + table(["open", "option", "best score", "best of all", "contradicts"], rows))
 
 

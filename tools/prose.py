@@ -46,22 +46,22 @@ WORDS = Path(__file__).with_suffix(".toml")
 CODE = ("benchmarks", "examples", "fmus", "orchestrator", "src", "tests", "tools")
 PRODUCT = ("fmus", "orchestrator", "src")
 
-#: How many words the sentences of a page have at most, on average.
+#: Largest average number of words in the sentences of a page.
 LIMIT = 20
 
-#: What proselint does not check: marks that Markdown has in ASCII, numbers that are no dates, and
-#: what the file of words has too.
+#: Checks of proselint that are off: about ASCII marks, which Markdown needs, about dates, which it
+#: sees in other numbers, and about words of our own list.
 _OFF = ("annotations", "dates_times", "typography", "weasel_words")
 
-#: What stands for code within a sentence.
+#: Stands for code within a sentence.
 _CODE = "`…`"
 
-#: What keeps blocks apart where they are read as one text: no rule passes over it.
+#: Separates blocks that are checked as one text: no rule matches across it.
 _BETWEEN = "\n\n¶\n\n"
 
 _MARKDOWN = MarkdownIt("commonmark").enable("table")
 
-#: Where sentences end, the end of an item that is one, and what has a full stop within one.
+#: Ends of sentences, the end of an item that is one, and abbreviations with a full stop.
 _END = re.compile(
     r"""[.!?]["')\]]*\s+(?=["'(\[]*(?:[A-Z0-9`§λγστε]|ecos|fmpy|libcosim|pip|theta_hat))"""
 )
@@ -71,7 +71,7 @@ _ABBREVIATION = re.compile(
 )
 
 
-#: What a docstring holds that is no prose: code in backquotes, and examples.
+#: Parts of a docstring that are not prose: code in backquotes, and examples.
 _INLINE = re.compile(
     r"(?::\w+:)?``?[^`]+``?(?:__?)?|^ *>>> .*$|^( +)\.\. math::.*\n(?:\1 +.*\n|\n)*", re.M
 )
@@ -79,10 +79,10 @@ _INDENTED = re.compile(
     r"(?<=::\n)(?:\n| {4}.*(?:\n|\Z))+|(?:(?<=\n\n) {4}.*(?:\n|\Z))(?: {4}.*(?:\n|\Z)|\n)*"
 )
 
-#: Comments that are orders to tools.
+#: Comments for tools.
 _ORDER = re.compile(r"!|fmt:|noqa|type:|pragma|mypy:|clang-format|eslint|@ts-|prettier")
 
-#: Comments in C and in TypeScript; strings are found so that nothing in them is one.
+#: Comments in C and TypeScript, and strings, which may contain their signs.
 _C_COMMENT = re.compile(
     r'"(?:\\.|[^"\\\n])*"|/\*(?P<block>.*?)\*/|(?<!:)//(?P<line>[^\n]*(?:\n[ \t]*//[^\n]*)*)', re.S
 )
@@ -93,11 +93,11 @@ class Block(NamedTuple):
 
     line: int
     text: str
-    #: Whether its sentences are counted.
+    #: True if its sentences are counted.
     is_prose: bool
-    #: Whether it describes a piece of code.
+    #: True if it describes code.
     is_inside: bool = False
-    #: Whether it is a value in code, which may be shown to a user.
+    #: True for a value in code, which may be shown to a user.
     is_message: bool = False
 
 
@@ -114,11 +114,11 @@ class Rule(NamedTuple):
     find: re.Pattern[str]
     write: str
     unless: re.Pattern[str] | None
-    #: Whether they are avoided as the first words of docstrings and comments only.
+    #: True if the words are avoided only at the beginning of docstrings and comments.
     opens: bool
 
     def spans(self, text: str) -> Iterator[tuple[int, int]]:
-        """Where a text has the words: from, to."""
+        """Places of the words in a text: from, to."""
         right = list(self.unless.finditer(text)) if self.unless else []
         for match in self.find.finditer(text):
             if not any(other.start() <= match.start() < other.end() for other in right):
@@ -201,7 +201,7 @@ def c_blocks(text: str) -> Iterator[Block]:
 
 
 def without_code(text: str) -> str:
-    """Return a docstring in which code is a sign, on the same lines."""
+    """Return a docstring with a sign in place of code, on the same lines."""
     first, *rest = text.split("\n", 1)
     text = "\n".join([first, *(cleandoc(f"\n.\n{rest[0]}").split("\n", 1)[1:] if rest else [])])
     for code in (_INDENTED, _INLINE):
@@ -239,7 +239,7 @@ def markdown_blocks(text: str) -> Iterator[Block]:
 
 
 def spoken(tokens: Sequence[Token]) -> str:
-    """What a reader reads of a text."""
+    """Readable part of a text."""
     instead = {"code_inline": _CODE, "softbreak": "\n", "hardbreak": "\n"}
     parts = (instead.get(t.type, t.content if t.type == "text" else "") for t in tokens)
     return "".join(parts)
@@ -256,13 +256,13 @@ def sentences(text: str) -> Iterator[str]:
 
 
 def length(sentence: str) -> int:
-    """How many words a sentence has."""
+    """Number of words in a sentence."""
     return sum(word.startswith(_CODE) or any(map(str.isalnum, word)) for word in sentence.split())
 
 
 @cache
 def rules() -> Sequence[Rule]:
-    """The words to avoid that the file lists."""
+    """Rules of the file."""
     return [
         Rule(
             pattern(rf"(?<!\w)(?:{rule['find']})(?!\w)"),
@@ -280,7 +280,7 @@ def pattern(text: str) -> re.Pattern[str]:
 
 
 def findings(page: Page) -> Iterator[str]:
-    """A line for each place of a page where something else should be written."""
+    """Findings on a page, one line each."""
     text = _BETWEEN.join(block.text for block in page.blocks)
     begins = [0, *accumulate(len(block.text) + len(_BETWEEN) for block in page.blocks)]
     found = [(*span, rule.write) for rule in rules() if not rule.opens for span in rule.spans(text)]
@@ -298,15 +298,15 @@ def findings(page: Page) -> Iterator[str]:
 
 
 def library_findings(text: str) -> Iterator[tuple[int, int, str]]:
-    """Where proselint finds something in a text, from and to, and what it says."""
+    """Findings of proselint in a text: from, to, and the message."""
     registry = CheckRegistry()
     if not registry.checks:
         registry.register_many(library_checks)
     selected = DEFAULT["checks"] | dict.fromkeys(_OFF, False)
     for result in LintFile("text", f"{text}\n").lint({**DEFAULT, "checks": selected}):
-        # It puts a line in front.
+        # LintFile inserts a line at the beginning.
         begin, end = (place - 1 for place in result.check_result.span)
-        # It finds "for ever" in "for every", and numbers and symbols that occur twice.
+        # False findings: "for ever" in "for every", and repeated numbers and symbols.
         is_word = not text[end - 1 : end + 1].isalpha()
         if is_word and not re.fullmatch(r"(?:\w|[\d.]+)\s+(?:\w|[\d.]+)", text[begin:end]):
             yield begin, end, result.check_result.message
@@ -320,7 +320,7 @@ def quotation(text: str, begin: int, end: int) -> str:
     return " ".join(f"{before.group()}{text[begin:end]}{after.group()}".split())
 
 
-#: How a kind of file is read, and folders in which nothing is read.
+#: Readers by kind of file, and folders that are skipped.
 READERS = {
     ".md": markdown_blocks,
     ".ipynb": notebook_blocks,
@@ -334,7 +334,7 @@ _FOREIGN = {"node_modules", "__pycache__"}
 
 
 def main() -> int:
-    """Print findings and lengths; the exit status."""
+    """Print findings and lengths, and return the exit status."""
     command = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     command.add_argument("path", nargs="*", type=Path, help="page or folder; default: all")
     paths = [path.resolve() for path in command.parse_args().path]

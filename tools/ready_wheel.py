@@ -1,8 +1,7 @@
-"""Make the wheel that carries the native FMUs and the loop in C for all platforms, and Python's.
+"""Build a wheel with FMUs of both kinds for all platforms, the loop in C, and the live page.
 
-It carries the parts of the live page, too. `python tools/ready_wheel.py [--out DIR]` needs npm and
-`pip install -e '.[native,test]'`. Where this wheel is installed, runs need no compiler and build
-nothing. `pip install .` makes a wheel without them.
+`python tools/ready_wheel.py [--out DIR]` needs npm and `pip install -e '.[native,test]'`. With this
+wheel, runs need no compiler and build nothing. `pip install .` builds a wheel without these parts.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def write_fmus(folder: Path) -> None:
-    """Make the FMUs for all platforms, as `orchestrator.machine.cache` finds them.
+    """Build the FMUs for all platforms, in the layout of `orchestrator.machine.cache`.
 
     Raises:
         InputError: they cannot be built.
@@ -45,7 +44,7 @@ def write_fmus(folder: Path) -> None:
 
 
 def write_programs(folder: Path) -> None:
-    """Make the parts of the live page, and the loop in C, in the same way.
+    """Build the parts of the live page and the loop in C, in the same layout.
 
     Raises:
         OSError: there is no compiler, or it fails.
@@ -75,7 +74,7 @@ def write_programs(folder: Path) -> None:
 
 @contextmanager
 def loader_for_any_linux() -> Iterator[None]:
-    """Let the compiler of the Python kind's loader be ziglang's, which links to an old glibc."""
+    """Compile the loader of the Python kind with ziglang, for an old glibc."""
     path = os.environ["PATH"]
     with TemporaryDirectory() as folder:
         compiler = Path(folder, COMPILERS[0])
@@ -93,7 +92,7 @@ def loader_for_any_linux() -> Iterator[None]:
 
 
 def write_wheel(folder: Path, ready: Path) -> Path:
-    """Make the wheel of a folder that :func:`write_fmus` and :func:`write_programs` have filled."""
+    """Build the wheel with the folder of :func:`write_fmus` and :func:`write_programs`."""
     builder = WheelBuilder(str(ROOT))
     builder.target_config["force-include"][str(ready)] = "orchestrator/ready"
     [wheel] = builder.build(directory=str(folder.resolve()))
@@ -101,7 +100,7 @@ def write_wheel(folder: Path, ready: Path) -> Path:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Make the wheel, and say where it is."""
+    """Build the wheel, and print its path."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("dist"), metavar="DIR")
     out = parser.parse_args(arguments).out

@@ -1,16 +1,17 @@
-"""Reference results, with which a user checks an import into another tool.
+"""Write reference results, with which a user checks an import into another tool.
 
-For each FMU, in the manner of the FMI cross-check: `NAME_in.csv` with inputs over time,
-`NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment, in the folder `reference` of
-its component. For the system: `reference/auv_ref.csv` and `auv_ref.opt`, from a Jacobi run, which
-is what most tools do. For each example: the same in `examples/NAME/reference`, with experiments of
-100 steps that suit it.
+    python tools/reference.py [FOLDER]
 
-Beside them, what the FMU carries, as the draft FMI-LS-REF has it: `fmi-ls-manifest.xml`, which
-names the others; `experiments.exp`, in the draft MA-HS-Experiments; a parameter set for each group
-of scenarios that sets parameters of the component; the results of each experiment, in fewer rows.
+writes them into this repository or FOLDER. For each FMU, as in the FMI cross-check: `NAME_in.csv`
+with inputs over time, `NAME_ref.csv` with the outputs, `NAME_ref.opt` with the experiment, in the
+folder `reference` of its component. For the system: `reference/auv_ref.csv` and `auv_ref.opt`, from
+a run in Jacobi order, like most tools. For each example: the same in `examples/NAME/reference`,
+with suitable experiments of 100 steps.
 
-`python tools/reference.py [FOLDER]` writes them anew, into this repository or FOLDER.
+The same folders have the files that the FMU contains, by the draft FMI-LS-REF:
+`fmi-ls-manifest.xml`, which names the others; `experiments.exp`, by the draft MA-HS-Experiments; a
+parameter set for each group of scenarios that sets parameters of the component; the results of each
+experiment, in fewer rows.
 """
 
 from __future__ import annotations
@@ -50,14 +51,14 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
 class Span(NamedTuple):
-    """How long a reference run is, and its step [s]."""
+    """Length of a reference run, and its step [s]."""
 
     stop_time: float
     step: float
 
     @property
     def times(self) -> np.ndarray:
-        """Of all communication points."""
+        """Times of all communication points."""
         return np.arange(round(self.stop_time / self.step) + 1) * self.step
 
 
@@ -68,11 +69,11 @@ STOP_TIME, STEP = SPAN
 #: Rows of the reference results of an example, at most: they span its default experiment.
 ROWS = 100
 
-#: Of the results that an FMU carries, one row in so many; and how close a tool comes: the libraries
-#: of mathematics of two machines may differ in the last place.
+#: Interval of the rows in an FMU's results, and their tolerance: mathematical functions of two
+#: machines may differ in the last place.
 EVERY, TOLERANCE = 10, 1e-9
 
-#: Scenarios whose parameters are a parameter set, by its name, and what it is.
+#: Parameter sets by name: their scenarios, and their description.
 SETS = {
     "fig4": (("fig4",), "Parameters of Fig. 4 of the paper"),
     "fig5": (("fig5", "fig5-pd"), "Parameters of Fig. 5 of the paper"),
@@ -86,10 +87,10 @@ _TYPES = {
     ".ssv": "application/x-ssp-parameter-set",
 }
 
-#: The parameters that are a path, of a planner that runs through waypoints.
+#: Parameters of a path through waypoints.
 _PATH = ("count", "timed", "cruise", "rounding")
 
-#: FMI-LS-REF as it is written, and the attributes that it wants in a manifest.
+#: Namespace of FMI-LS-REF, and the attributes of its manifest.
 _NAMESPACE = "http://fmi-standard.org/fmi-ls-manifest"
 _STANDARD = {
     "name": "org.fmi-standard.fmi-ls-ref",
@@ -99,7 +100,7 @@ _STANDARD = {
 
 
 def reference_inputs(component: Component, span: Span = SPAN) -> np.ndarray:
-    """Inputs without special values: each circles around its start with a frequency of its own.
+    """Inputs that oscillate around their start values, each with its own frequency.
 
     A Real is a sine, small enough for the gate; a Boolean is true while that is not negative.
     """
@@ -124,12 +125,12 @@ def reference_outputs(
     values: Mapping[str, Value] | None = None,
     span: Span = SPAN,
 ) -> np.ndarray:
-    """Outputs of an FMU that runs alone with these inputs, by fmpy.
+    """Outputs of a single FMU with these inputs, by fmpy.
 
     Args:
         component: the FMU.
         inputs: over time.
-        values: of its parameters; None: its own.
+        values: of parameters; None: those of the FMU.
         span: of the run.
 
     """
@@ -152,7 +153,7 @@ def reference_outputs(
 
 
 def parameter_sets(component: Component) -> Iterator[tuple[str, dict[str, Value]]]:
-    """The parameter sets of an FMU that scenarios give it, by their names."""
+    """Parameter sets of an FMU from scenarios, by name."""
     if component.description.modelName not in components():
         return
     for name, (scenarios, _) in SETS.items():
@@ -161,14 +162,14 @@ def parameter_sets(component: Component) -> Iterator[tuple[str, dict[str, Value]
             _, system = load_scenario(scenario)
             for place, other in system.components.items():
                 if other.description.modelName == component.description.modelName:
-                    # A survey is the path that its planner begins with.
+                    # The path of a survey is its start values.
                     values |= _path(other) | system.parameters_of(place)
         if values:
             yield name, values
 
 
 def _path(component: Component) -> dict[str, Value]:
-    """The path of a planner that runs through waypoints; empty for any other component."""
+    """Path of a planner with waypoints; empty for any other component."""
     starts = component.starts
     if not starts.keys() >= {*_PATH}:
         return {}
@@ -211,7 +212,7 @@ def write_examples(root: Path) -> list[Path]:
     written = []
     with TemporaryDirectory() as temporary:
         for folder in sorted(path.parent for path in EXAMPLES.glob(f"*/{REFERENCE}")):
-            # This kind can be built everywhere.
+            # The Python kind can be built everywhere.
             fmu = build_own(folder, Path(temporary), kind=PYTHON)
             target = root / EXAMPLES.name / folder.name / REFERENCE
             written += write_component_reference(fmu, target, example_span(fmu))
@@ -219,7 +220,7 @@ def write_examples(root: Path) -> list[Path]:
 
 
 def example_span(fmu: Path) -> Span:
-    """The reference run of an example: its default experiment, with longer steps if need be."""
+    """Reference run of an example: its default experiment, with longer steps if necessary."""
     stated = read_component(fmu.stem, fmu).experiment
     stop_time, step = stated("stopTime"), stated("stepSize")
     assert stop_time is not None and step is not None
@@ -245,12 +246,12 @@ def write_component_reference(fmu: Path, folder: Path, span: Span = SPAN) -> lis
 def _write_related(
     component: Component, folder: Path, stimuli: str | None, outputs: np.ndarray, span: Span
 ) -> Iterator[Path]:
-    """Write what the FMU carries, and say which files.
+    """Write the files that the FMU contains; yield their paths.
 
     Args:
         component: the FMU.
         folder: to write into.
-        stimuli: name of the table of inputs there; None: it has none.
+        stimuli: name of the table of inputs there; None: there are no inputs.
         outputs: of the FMU with its own parameters.
         span: of the runs.
 

@@ -1,9 +1,8 @@
 """Public FMUs and SSP archives in our master: `python benchmarks/foreign FOLDER`.
 
-Collects public FMUs and SSP archives into FOLDER, runs each of them, holds what runs against
-libcosim, ecos and a plain host of its own, and writes tested-fmus.md. FMUs are programs of
-others, and run here with the rights of who starts this. `pip install libcosimpy ecospy tbb`
-installs what systems are compared with.
+Collects public FMUs and SSP archives into FOLDER, runs each of them, compares those that run with
+libcosim, ecos and a plain host, and writes tested-fmus.md. FMUs are third-party programs, and run
+with your rights. `pip install libcosimpy ecospy tbb` installs the other masters.
 """
 
 from __future__ import annotations

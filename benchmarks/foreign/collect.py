@@ -1,7 +1,7 @@
 """Public FMUs and SSP archives, from the repositories that hold them.
 
-Nothing of others is kept here: they are cloned from their public addresses at the commits below,
-and every file is counted once, however many repositories hold it.
+This repository holds none of them: they are cloned from their public addresses at the commits
+below, and every file counts once, in however many repositories it is.
 """
 
 from __future__ import annotations
@@ -16,8 +16,7 @@ from io import BytesIO
 from pathlib import Path, PurePosixPath
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
 
-#: Where others publish FMUs and archives, by repositories of GitHub, and the commits that are
-#: looked at.
+#: Repositories on GitHub with FMUs and archives, and their commits.
 PLACES = {
     "open-simulation-platform/libcosim": "52cc82513d3099df3c1c91eeb980227db52c70cf",
     "open-simulation-platform/demo-cases": "406ccab659b582abf36a2b6a6dac270ff3ab3456",
@@ -38,13 +37,13 @@ PLACES = {
     "LBNL-ETA/SimulatorToFMU": "607d29ce2a6a54cce71fbca01515b7beb698f555",
 }
 
-#: Suffixes of what is collected as it is, and of what a folder that is an archive has in it.
+#: Suffixes of files to collect, and of files within a folder that is an archive.
 _FMU, _SSP, _STRUCTURE = ".fmu", ".ssp", ".ssd"
 
 #: The structure that is run; a folder's others are variants of it.
 DEFAULT = "SystemStructure.ssd"
 
-#: The list of what has been collected, beside it.
+#: List of the collected files, in the same folder.
 _LIST = "collected.json"
 
 #: A zip's time, the same for all: what is in a folder makes the archive, not when it was cloned.
@@ -53,7 +52,7 @@ _TIME = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class Item:
-    """An FMU or an archive of others.
+    """A third-party FMU or archive.
 
     Attributes:
         place: repository that has it.
@@ -70,16 +69,16 @@ class Item:
 
     @property
     def name(self) -> str:
-        """Its place and path."""
+        """Repository and path."""
         return f"{self.place}/{self.path}"
 
     @property
     def is_fmu(self) -> bool:
-        """Whether it is an FMU, not an archive."""
+        """True for an FMU, false for an archive."""
         return self.path.endswith(_FMU)
 
     def fmi(self, folder: Path) -> str:
-        """The version of FMI that it states; empty: it states none, or is no FMU that can be read.
+        """Version of FMI in its description; empty if there is none, or if it cannot be read.
 
         Args:
             folder: into which it was collected.
@@ -95,7 +94,7 @@ class Item:
 
 
 def collect(folder: Path) -> list[Item]:
-    """Clone all places, and lay out what they have in a folder.
+    """Clone all repositories, and store their files in a folder.
 
     Args:
         folder: that keeps the clones and the files; what it has is not fetched again.
@@ -120,15 +119,15 @@ def collect(folder: Path) -> list[Item]:
 
 
 def collected(folder: Path) -> list[Item]:
-    """What :func:`collect` has laid out there before."""
+    """Files that :func:`collect` has stored before."""
     return [Item(**item) for item in json.loads((folder / _LIST).read_text(encoding="utf-8"))]
 
 
 class _Clone:
-    """A repository at one commit, of which files are read one by one."""
+    """A repository at one commit, whose files are read one by one."""
 
     def __init__(self, folder: Path, place: str, commit: str) -> None:
-        """Clone it, unless that has been done."""
+        """Clone the repository, unless it is there."""
         self.place, self._folder, self._commit = place, folder, commit
         if not folder.is_dir():
             # Without the files: a few of them are wanted, and git fetches those when they are read.
@@ -138,7 +137,7 @@ class _Clone:
         self.paths = self._git("ls-tree", "-r", "-z", "--name-only", commit).decode().split("\0")
 
     def read(self, path: str) -> bytes | None:
-        """A file; None where it cannot be had."""
+        """Content of a file; None if it is not available."""
         try:
             return self._git("show", f"{self._commit}:{path}")
         except subprocess.CalledProcessError:
@@ -150,7 +149,7 @@ class _Clone:
 
 
 def _items(clone: _Clone) -> Iterator[tuple[Item, bytes | None]]:
-    """What a repository has, with its content; None: it could not be had."""
+    """Files of a repository with their content; None if it is not available."""
     structures: dict[PurePosixPath, list[str]] = {}
     for path in map(PurePosixPath, clone.paths):
         if path.suffix in (_FMU, _SSP):
@@ -184,7 +183,7 @@ def _inside(clone: _Clone, path: PurePosixPath, content: bytes) -> Iterator[tupl
 def _archived(
     clone: _Clone, parent: PurePosixPath, folders: set[PurePosixPath]
 ) -> Iterator[tuple[str, bytes]]:
-    """What a folder's archive has in it: all that is below it, but for other archives."""
+    """Files of an archive that is a folder, without other archives in it."""
     for path in map(PurePosixPath, clone.paths):
         nearest = next((p for p in path.parents if p in folders), None)
         if (

@@ -1,4 +1,4 @@
-"""Every FMU and every archive in our master and in others, each run in a process of its own."""
+"""Run every FMU and archive in our master and in others, each in a separate process."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ import numpy as np
 from collect import Item
 from other_masters import TOOLS
 
-#: Steps of every run, and seconds that it may take.
+#: Steps of every run, and its time limit [s].
 STEPS, PATIENCE = 200, 600
 
-#: Of what a tool says, the last line says why it has failed; more than this of it is not kept.
+#: Longest part of a tool's output that is kept; its last line has the reason of a failure.
 _LONGEST_REASON = 400
 
-#: Share of a parameter's value within which it is held.
+#: Relative tolerance of a parameter that was read back.
 _HELD = 1e-12
 
 _HERE = Path(__file__).parent
 
 
 def compared(items: Sequence[Item], folder: Path, workers: int) -> dict[str, dict[str, Any]]:
-    """What came of each, by its name."""
+    """Results by name."""
     with ThreadPoolExecutor(workers) as pool:
         names = [item.name for item in items]
         return dict(zip(names, pool.map(partial(_one, folder), items), strict=True))
@@ -51,7 +51,7 @@ def _one(folder: Path, item: Item) -> dict[str, Any]:
 
 
 def _fmu(file: Path, folder: Path) -> dict[str, Any]:
-    """An FMU alone, against a plain host, with its own parameters and with others."""
+    """Compare an FMU with a plain host, with its own parameters and with others."""
     found = _ours(file, folder / "default.json")
     if found["outcome"] == "runs":
         found["deviation"] = _against(_HERE / "host.py", file, folder / "default.json")
@@ -63,7 +63,7 @@ def _fmu(file: Path, folder: Path) -> dict[str, Any]:
 
 
 def _archive(file: Path, folder: Path) -> dict[str, Any]:
-    """An archive in the default order, and in the one of other masters beside them."""
+    """Run an archive in the default order, and compare it with other masters in theirs."""
     found = _ours(file, folder / "default.json")
     jacobi = _ours(file, folder / "jacobi.json", "--order", "jacobi")
     if jacobi["outcome"] == "runs":
@@ -75,7 +75,7 @@ def _archive(file: Path, folder: Path) -> dict[str, Any]:
 
 
 def _ours(file: Path, out: Path, *options: str) -> dict[str, Any]:
-    """What our master makes of it, and why not."""
+    """Result of our master, or the reason of its failure."""
     ended = _run(_HERE / "ours.py", file, STEPS, out, *options)
     if not out.exists():
         return {"outcome": "crashes", "reason": ended}
@@ -97,7 +97,7 @@ def _ours(file: Path, out: Path, *options: str) -> dict[str, Any]:
 
 
 def _against(*command: object, skip: int = 0) -> float | str:
-    """Largest deviation from another host, relative to a column's size where that is above one.
+    """Largest deviation from another host, relative to the size of a column if it is above one.
 
     Args:
         command: that runs it; the last of it is what our run has written.
@@ -123,7 +123,7 @@ def _against(*command: object, skip: int = 0) -> float | str:
 
 
 def _run(*command: object) -> str:
-    """Run a script to its end; returns why it has not come to it."""
+    """Run a script; return the reason if it fails."""
     with TemporaryDirectory() as folder:
         process = subprocess.Popen(
             [sys.executable, *map(str, command)],

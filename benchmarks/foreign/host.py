@@ -1,4 +1,4 @@
-"""A host of one FMU that shares nothing with the master: what it is held against.
+"""A host of one FMU that shares no code with the master, for comparison.
 
 As plain as FMI allows: ctypes, a fixed step, t_k = k h, every Real output read after every step.
 `python host.py FMU RUN OUT`, where RUN is what `ours.py` has written about the same run.
@@ -51,7 +51,7 @@ class Variable:
     """A real variable of the description, or an array: names of its elements, value reference."""
 
     def __init__(self, element: ElementTree.Element, shape: list[int]) -> None:
-        """Read what is needed."""
+        """Read an element of the description."""
         name = element.get("name", "")
         self.causality = element.get("causality", "local")
         self.reference = int(element.get("valueReference", "0"))
@@ -66,7 +66,7 @@ class Host:
     fmi, platform = "fmi2", "linux64"
 
     def __init__(self, folder: Path, root: ElementTree.Element) -> None:
-        """Read its description, and load it."""
+        """Read the description, and load the library."""
         self.folder = folder
         simulation = root.find("CoSimulation")
         assert simulation is not None
@@ -81,7 +81,7 @@ class Host:
         self.instance = ctypes.c_void_p()
 
     def shape(self, _: ElementTree.Element, __: ElementTree.Element) -> list[int]:
-        """The lengths of an array; of a scalar, none."""
+        """Lengths of an array; empty for a scalar."""
         return []
 
     def call(self, name: str, *arguments: object) -> None:
@@ -91,7 +91,7 @@ class Host:
             raise RuntimeError(f"{self.fmi}{name} returns {status}")
 
     def initialise(self, values: Mapping[str, float]) -> None:
-        """Instantiate it, and lead it through initialisation with other start values."""
+        """Instantiate and initialise the FMU with other start values."""
         library = ctypes.CDLL(None)
         self._callbacks = _Callbacks(
             _Logger(lambda *_: None),
@@ -157,13 +157,13 @@ class Host3(Host):
     fmi, platform = "fmi3", "x86_64-linux"
 
     def shape(self, root: ElementTree.Element, element: ElementTree.Element) -> list[int]:
-        """The lengths of an array, which structural parameters may hold."""
+        """Lengths of an array, which may be structural parameters."""
         sizes = {e.get("valueReference"): e.get("start") for e in root.iterfind("ModelVariables/*")}
         dimensions = element.findall("Dimension")
         return [int(d.get("start") or sizes[d.get("valueReference")] or 0) for d in dimensions]
 
     def initialise(self, values: Mapping[str, float]) -> None:
-        """Instantiate it, and lead it through initialisation with other start values."""
+        """Instantiate and initialise the FMU with other start values."""
         self._log = _Logger3(lambda *_: None)
         self.dll.fmi3InstantiateCoSimulation.restype = ctypes.c_void_p
         resources = f"{self.folder / 'resources'}/".encode()

@@ -1,4 +1,4 @@
-"""libcosim and ecos, which run systems of others: `python other_masters.py TOOL FILE SYSTEM OUT`.
+"""libcosim and ecos on third-party systems: `python other_masters.py TOOL FILE SYSTEM OUT`.
 
 SYSTEM is what `ours.py` has written about the same run; OUT is where the rows go.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from orchestrator import load
 from orchestrator.cosim import write_osp
 
-#: Where the name of a parameter set stands.
+#: Attribute with the name of a parameter set.
 _PARAMETER_SET = re.compile(r"ParameterSet\b[^>]*\bname=\"([^\"]*)\"")
 
 #: A Real output: component, port, value reference.
@@ -39,7 +39,7 @@ def libcosim(file: str, step: float, steps: int, outputs: Sequence[Output]) -> n
 
 
 def libcosim_export(file: str, step: float, steps: int, outputs: Sequence[Output]) -> np.ndarray:
-    """The same, of the system as we have read it, in libcosim's own configuration."""
+    """Values of the outputs after each step, from libcosim with our export of the system."""
     from libcosimpy.CosimExecution import CosimExecution  # noqa: PLC0415
 
     write_osp(replace(load(file), step=step), Path())

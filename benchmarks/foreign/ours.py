@@ -1,7 +1,7 @@
-"""The master under test, in a process of its own: what it makes of an FMU or an archive.
+"""Our master on an FMU or an archive, in a separate process.
 
-`python ours.py FILE STEPS OUT [--order jacobi] [--changed]` writes what came of it to OUT, and the
-rows of all outputs beside it.
+`python ours.py FILE STEPS OUT [--order jacobi] [--changed]` writes the result to OUT, and the rows
+of all outputs next to it.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from orchestrator.cosim import Component, System, Value, Variable, read_componen
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import DEFAULT_STEP
 
-#: Name of the component that an FMU is alone.
+#: Name of the component of a single FMU.
 ALONE = "fmu"
 
-#: By how much a Real parameter is changed: of its start value, or from zero.
+#: Change of a Real parameter, relative to its start value, or from zero.
 _CHANGE = 0.01
 
 
 def system_of(file: Path) -> System:
-    """The system that a file holds."""
+    """System in a file."""
     if file.suffix != ".fmu":
         return load(file)
     return System(file.stem, {ALONE: read_component(ALONE, file)}, ())
 
 
 def step_of(system: System) -> float:
-    """The step that a system asks for, or its first FMU that names one [s]."""
+    """Step of a system, or of its first FMU with one [s]."""
     stated = [c.description.defaultExperiment for c in system.components.values()]
     steps = [float(s.stepSize) for s in stated if s is not None and s.stepSize]
     return system.step or next(iter(steps), DEFAULT_STEP)
@@ -62,7 +62,7 @@ def _other(variable: Variable, start: Value | None) -> float | None:
 
 
 def run(options: argparse.Namespace) -> dict[str, Any]:
-    """Run what a file holds, and keep the rows of its outputs."""
+    """Run the system in a file, and keep the rows of its outputs."""
     with warnings.catch_warnings(record=True) as caught:
         system = system_of(options.file)
         step = step_of(system)
@@ -100,7 +100,7 @@ def _keep(result: Result, names: list[str], out: Path) -> None:
 
 
 def main() -> None:
-    """Run it, and write what came of it."""
+    """Run the file, and write the result."""
     parser = argparse.ArgumentParser()
     parser.add_argument("file", type=Path)
     parser.add_argument("steps", type=int)

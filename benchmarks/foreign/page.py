@@ -1,4 +1,4 @@
-"""docs/reference/tested-fmus.md and tested-fmus.csv from what came of every file."""
+"""Write docs/reference/tested-fmus.md and tested-fmus.csv from the results of all files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from typing import Any
 from compare import STEPS
 from other_masters import TOOLS
 
-#: Deviations up to these are rounding errors: of a system in another tool, of an FMU alone.
+#: Deviations up to these are rounding errors: of a system in another tool, of a single FMU.
 SYSTEM_BOUND, FMU_BOUND = 1e-9, 1e-12
 
 #: Why what runs deviates, by a part of its path and who it deviates from.
@@ -37,7 +37,7 @@ _REASONS = {
     "not valid": "",
 }
 
-#: What came of a file, in the words of the page.
+#: Results of a file, in the words of the page.
 _OUTCOMES = {
     "refused": "refused",
     "fails": "ended early",
@@ -49,8 +49,7 @@ _HEAD = """\
 
 Which public FMUs and SSP archives run in auv-fmu. `python benchmarks/foreign FOLDER` writes this
 page and [tested-fmus.csv](tested-fmus.csv), which says of every file that does not run why, and of
-every archive what its run reported. It clones public repositories at named commits, and runs each
-file in a process of its own; files with the same bytes count once.
+every archive what its run reported. Files with the same bytes count once.
 
 - **Archives** run unchanged, in the default order, for {steps} steps or to the end that they name.
   They are compared in Jacobi order with {tools}.
@@ -63,7 +62,7 @@ file in a process of its own; files with the same bytes count once.
 
 
 def page(found: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
-    """The page."""
+    """Text of the page."""
     head = _HEAD.format(steps=STEPS, host=lines_of_host, tools=" and ".join(_tools()))
     there = [one for one in found if one["outcome"] != "absent"]
     archives = [one for one in there if not one["is_fmu"]]
@@ -73,7 +72,7 @@ def page(found: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
 
 
 def listed(found: Sequence[Mapping[str, Any]]) -> str:
-    """The table of files, in CSV: what does not run and why, and what archives report."""
+    """Table of files in CSV: reasons of those that do not run, and messages of archives."""
     text = StringIO()
     table = writer(text, lineterminator="\n")
     table.writerow(("kind", "file", "outcome"))
@@ -116,13 +115,13 @@ def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def _said(lines: Sequence[str]) -> str:
-    """What a run has said, in a cell."""
+    """A message of a run, in a cell."""
     more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
     return f"{_cell(lines[0])}{more}" if lines else ""
 
 
 def _compared(one: Mapping[str, Any], tool: str, deviation: float | str) -> str:
-    """What came of the comparison: a number, or why there is none."""
+    """Result of a comparison: a number, or the reason that there is none."""
     if isinstance(deviation, str):
         return "not run" if deviation else ""
     if deviation <= SYSTEM_BOUND:
@@ -140,7 +139,7 @@ def _explained(one: Mapping[str, Any], tool: str) -> str:
 
 
 def _not_running(*kinds: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """How many archives and FMUs do not run, by their reasons."""
+    """Numbers of archives and FMUs that do not run, by reason."""
     counts = [Counter(_reason(one) for one in files if one["outcome"] != "runs") for files in kinds]
     yield "\n## What does not run\n\n| reason | archives | FMUs |\n| --- | --: | --: |"
     for reason in _REASONS:
@@ -166,7 +165,7 @@ def _fmus(there: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def _versions(fmus: Sequence[Mapping[str, Any]]) -> str:
-    """How many run of each version of FMI of which any does."""
+    """Numbers of FMUs that run, by version of FMI."""
     counts = Counter(one["fmi"] for one in fmus)
     running = Counter(one["fmi"] for one in fmus if one["outcome"] == "runs")
     said = (f"{running[fmi]} of {counts[fmi]} of FMI {fmi}" for fmi in sorted(running))
@@ -182,7 +181,7 @@ def _within(numbers: Iterable[float]) -> int:
 
 
 def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    """What came of other values for all Real parameters."""
+    """Results with other values of all Real parameters."""
     changed = [one for one in fmus if "changed" in one and one["changed"].get("wanted") != 0]
     ran = [one for one in changed if one["changed"]["outcome"] == "runs"]
     lost = [one for one in ran if one["changed"]["lost"]]
@@ -210,13 +209,13 @@ def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
 
 
 def _name(one: Mapping[str, Any]) -> str:
-    """Where a file comes from, and how often it is there."""
+    """Source of a file, and its number of copies."""
     more = f" ({one['copies']} more)" if one["copies"] else ""
     return f"{one['place']}: {_cell(one['path'])}{more}"
 
 
 def _why(one: Mapping[str, Any]) -> str:
-    # Alone, an FMU has the name of its file.
+    # A single FMU has the name of its file.
     reason = re.sub(r"^fmu: (\S+\.fmu )?", "", one["reason"])
     return f"{_OUTCOMES[one['outcome']]}: {_cell(reason)}"
 

@@ -1,4 +1,4 @@
-"""The example `bouncing_ball` as a slave of PythonFMU alone; it takes one step a call."""
+"""The example `bouncing_ball` as a plain slave of PythonFMU, which takes one step a call."""
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 

@@ -1,4 +1,4 @@
-"""The example `resistor` as a slave of PythonFMU alone."""
+"""The example `resistor` as a plain slave of PythonFMU."""
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 

@@ -1,4 +1,4 @@
-"""The example `sine_network` as a slave of PythonFMU alone."""
+"""The example `sine_network` as a plain slave of PythonFMU."""
 
 from math import sin, tanh
 

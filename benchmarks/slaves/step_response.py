@@ -1,4 +1,4 @@
-"""The example `step_response` as a slave of PythonFMU alone."""
+"""The example `step_response` as a plain slave of PythonFMU."""
 
 from math import exp
 

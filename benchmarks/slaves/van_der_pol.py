@@ -1,4 +1,4 @@
-"""The example `van_der_pol` as a slave of PythonFMU alone; it takes one step a call."""
+"""The example `van_der_pol` as a plain slave of PythonFMU, which takes one step a call."""
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 

@@ -10,7 +10,7 @@ G. L. Plett, Battery Management Systems. The table is typical of such a cell, bu
 
 The charge is counted exactly for a held current, and the pairs are solved exactly. A cell that is
 empty gives no current, and a full one cannot be charged: `i` is 0 then. The voltage depends on the
-current directly, the charge does not, which its `feedthrough=()` says.
+current directly; the charge does not, hence its `feedthrough=()`.
 
 With the default values 1.25 A empty it in two hours. Look at `voltage` and `charge`.
 """
@@ -41,20 +41,20 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What it is asked for."""
+    """Load of the cell."""
 
     demand: Annotated[float, Variable("A", "Current to deliver, negative to charge")] = 1.25
 
 
 class State(NamedTuple):
-    """What it contains."""
+    """Charge, and voltages of the pairs."""
 
     charge: float  #: as a fraction of the capacity
     v: Annotated[Vector, 2]  #: voltages of the pairs [V]
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the cell."""
 
     voltage: Annotated[float, Variable("V", "Voltage of the terminals")]
     i: Annotated[float, Variable("A", "Current that it delivers")]
@@ -84,7 +84,7 @@ def update(parameters: Parameters, state: State, derived: float, h: float) -> St
 
 
 def outputs(parameters: Parameters, state: State, derived: float) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the cell."""
     source = interpolate(state.charge, CHARGES, SOURCE)
     voltage = source - parameters.R0 * derived - state.v.sum()
     return Outputs(voltage, derived, state.charge, state.charge <= 0)

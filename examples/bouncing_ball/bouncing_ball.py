@@ -28,7 +28,7 @@ H_MAX, STEP_SIZE, STOP_TIME = 0.001, 0.01, 3.0
 
 
 class Parameters(NamedTuple):
-    """The ball, and where it starts."""
+    """Ball, and its start."""
 
     g: Annotated[float, Variable("m/s2", "Gravity acting on the ball", maximum=0.0)] = -9.81
     e: Annotated[
@@ -42,7 +42,7 @@ class Parameters(NamedTuple):
 
 
 class State(NamedTuple):
-    """Its motion."""
+    """Motion of the ball."""
 
     h: float  #: height [m]
     v: float  #: velocity, upwards [m/s]
@@ -50,7 +50,7 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the ball."""
 
     h: Annotated[float, Variable("m", "Height of the ball")]
     v: Annotated[float, Variable("m/s", "Velocity of the ball, upwards")]
@@ -76,5 +76,5 @@ def update(parameters: Parameters, state: State, h: float) -> State:
 
 
 def outputs(state: State) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the ball."""
     return Outputs(state.h, state.v)

@@ -24,7 +24,7 @@ H_MAX, STOP_TIME = 0.02, 5.0
 
 
 class Parameters(NamedTuple):
-    """Cart and pendulum, and how it starts."""
+    """Cart and pendulum, and the start."""
 
     M: Annotated[float, Variable("kg", "Mass of the cart", POSITIVE)] = 1.0
     m: Annotated[float, Variable("kg", "Mass of the pendulum", POSITIVE)] = 0.2
@@ -35,20 +35,20 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What acts on it."""
+    """Force on the cart."""
 
     u: Annotated[float, Variable("N", "Force on the cart")] = 0.0
 
 
 class State(NamedTuple):
-    """Its motion."""
+    """Motion of cart and pendulum."""
 
     q: Annotated[Vector, 2]  #: position [m] and angle [rad]
     dq: Annotated[Vector, 2]  #: their rates
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the cart and the pendulum."""
 
     p: Annotated[float, Variable("m", "Position of the cart")]
     angle: Annotated[float, Variable("rad", "Angle of the pendulum from upright")]
@@ -87,7 +87,7 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(parameters: Parameters, state: State) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the cart and the pendulum."""
     q, dq, m, l = state.q, state.dq, parameters.m, parameters.l
     v, turn = dq[0], l * dq[1]
     bob = v * v + 2 * v * turn * cos(q[1]) + turn * turn

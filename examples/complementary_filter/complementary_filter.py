@@ -3,10 +3,10 @@
     T d(angle)/dt = T gyro + (atan2(-a_x, a_z) - angle)
 
 A gyroscope measures fast motion well, but the integral of its bias drifts. An accelerometer shows
-where down is, but also every acceleration of the vehicle. The filter takes what is faster than `T`
-seconds from the first and what is slower from the second: its two transfer functions,
-T s / (T s + 1) and 1 / (T s + 1), add up to one. See W. T. Higgins, A comparison of complementary
-and Kalman filtering, 1975.
+the direction of gravity, but also every acceleration of the vehicle. The filter takes changes that
+are faster than `T` seconds from the first and slower ones from the second: its two transfer
+functions, T s / (T s + 1) and 1 / (T s + 1), add up to one. See W. T. Higgins, A comparison of
+complementary and Kalman filtering, 1975.
 
 It is a continuous filter, solved exactly for held inputs. The difference of both angles is taken
 around the circle, so that the filter may turn over.
@@ -26,14 +26,14 @@ STOP_TIME = 10.0
 
 
 class Parameters(NamedTuple):
-    """What may be set."""
+    """Time constant and start."""
 
     T: Annotated[float, Variable("s", "Time constant", minimum=POSITIVE, tunable=True)] = 2.0
     angle0: Annotated[float, Variable("rad", "Angle at the start")] = 0.0
 
 
 class Inputs(NamedTuple):
-    """What is measured, in the axes of the sensor."""
+    """Measurements in the axes of the sensor."""
 
     gyro: Annotated[float, Variable("rad/s", "Rate of the angle")] = 0.02
     a_x: Annotated[float, Variable("m/s2", "Specific force, forwards")] = 0.0
@@ -41,14 +41,14 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """What it has found."""
+    """Both estimates of the angle."""
 
     angle: float  #: [rad]
     gyro_angle: float  #: [rad]
 
 
 class Outputs(NamedTuple):
-    """What it tells."""
+    """Outputs of the filter."""
 
     angle: Annotated[float, Variable("rad", "Angle")]
     gyro_angle: Annotated[float, Variable("rad", "Angle from the gyroscope only")]
@@ -64,7 +64,7 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
     leaning = atan2(-inputs.a_x, inputs.a_z)
     difference = leaning - state.angle
     short_way = atan2(sin(difference), cos(difference))
-    # Where the filter would come to rest relative to its angle now.
+    # Final value of the filter, relative to its angle now.
     target = short_way + parameters.T * inputs.gyro
     return State(
         state.angle + target * (1.0 - exp(-h / parameters.T)),
@@ -73,5 +73,5 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(state: State) -> Outputs:
-    """What it tells."""
+    """Outputs of the filter."""
     return Outputs(state.angle, state.gyro_angle)

@@ -24,20 +24,20 @@ H_MAX, STEP_SIZE, STOP_TIME = 0.1, 0.1, 10.0
 
 
 class Parameters(NamedTuple):
-    """The rate, and the start."""
+    """Rate and start."""
 
     k: Annotated[float, Variable("1/s", "Rate of the decay")] = 1.0
     x0: Annotated[float, Variable("1", "Value at the start")] = 1.0
 
 
 class State(NamedTuple):
-    """Its value."""
+    """Value of x."""
 
     x: float
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the equation."""
 
     x: Annotated[float, Variable("1", "Value by the explicit Euler rule", feedthrough=())]
     exact: Annotated[float, Variable("1", "Value of the solution")]
@@ -54,5 +54,5 @@ def update(parameters: Parameters, state: State, h: float) -> State:
 
 
 def outputs(parameters: Parameters, state: State, t: float) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the equation."""
     return Outputs(state.x, parameters.x0 * exp(-parameters.k * t))

@@ -25,7 +25,7 @@ H_MAX, STOP_TIME = 0.02, 2.0
 
 
 class Parameters(NamedTuple):
-    """The motor, with what it turns."""
+    """Motor and load."""
 
     R: Annotated[float, Variable("Ohm", "Resistance of the armature", minimum=POSITIVE)] = 1.5
     L: Annotated[float, Variable("H", "Inductance of the armature", minimum=POSITIVE)] = 0.12
@@ -35,7 +35,7 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What acts on it."""
+    """Voltage and load."""
 
     u: Annotated[float, Variable("V", "Voltage of the armature")] = 12.0
     load: Annotated[float, Variable("N.m", "Torque that brakes the shaft")] = 0.0
@@ -48,7 +48,7 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the motor."""
 
     i: Annotated[float, Variable("A", "Current of the armature")]
     speed: Annotated[float, Variable("rad/s", "Speed of the shaft")]
@@ -71,7 +71,7 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(state: State) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the motor."""
     return Outputs(state.x[0], state.x[1], state.x[2])
 
 

@@ -7,10 +7,10 @@ interpolated in both directions: `interpolate` in each row at the speed, then be
 the throttle. Outside the map the torque of its edge holds. A closed throttle brakes. This is how
 engines are modelled from measurements on a test bench; see L. Guzzella and C. H. Onder,
 Introduction to Modeling and Control of Internal Combustion Engine Systems. The numbers of this map
-are invented. Speed and outputs both need the torque, which `derive` finds once.
+are invented. Both speed and outputs need the torque, so `derive` computes it once.
 
-A load above the torque slows the engine down to a standstill, which it does not leave before the
-torque is above the load.
+A load above the torque slows the engine down to a standstill, where it stays until the torque is
+above the load.
 
 With the default values it accelerates from idle until torque and load are equal. Look at `speed`,
 and at `stalled` with a load of 150 N.m.
@@ -37,7 +37,7 @@ H_MAX, STOP_TIME = 0.02, 10.0
 
 
 class Parameters(NamedTuple):
-    """What turns, and how fast at the start."""
+    """Inertia, and speed at the start."""
 
     J: Annotated[float, Variable("kg.m2", "Moment of inertia", minimum=POSITIVE)] = 0.2
     speed0: Annotated[float, Variable("rad/s", "Speed at the start", minimum=0.0)] = 80.0
@@ -51,13 +51,13 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """What is kept from step to step."""
+    """Speed of the shaft."""
 
     speed: float  #: [rad/s]
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the engine."""
 
     speed: Annotated[float, Variable("rad/s", "Speed of the shaft", feedthrough=())]
     torque: Annotated[float, Variable("N.m", "Torque of the engine", feedthrough=("throttle",))]
@@ -82,5 +82,5 @@ def update(parameters: Parameters, state: State, derived: float, inputs: Inputs,
 
 
 def outputs(state: State, derived: float) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the engine."""
     return Outputs(state.speed, derived, state.speed * derived, state.speed == 0)

@@ -4,16 +4,16 @@
     x = x_ + P_ H' S^-1 e,  P = P_ - P_ H' S^-1 H P_    correction
     x_ = F x,  P_ = F P F' + Q                          prediction
 
-The radar is at the origin. The state is the target's position and velocity in the plane, and what
-is measured is g(x) = (sqrt(px^2 + py^2), atan2(py, px)). A filter for such a curved g takes its
-slope at the best estimate there is; see Bar-Shalom, Li and Kirubarajan, Estimation with
+The radar is at the origin. The state is the target's position and velocity in the plane, and the
+measurement is g(x) = (sqrt(px^2 + py^2), atan2(py, px)). The filter linearises g at its latest
+estimate; see Bar-Shalom, Li and Kirubarajan, Estimation with
 Applications to Tracking and Navigation. The inverse of S is never computed: `solve` gives each row
 of the gain.
 
-The filter is sampled: its outputs belong to the measurement of their time. It starts from a guess,
-and from how good that is. A target at the origin has no bearing, and is refused. With the default
-values a target rests 1 km away, and the estimate goes there from 280 m off. Look at `position` and
-`range_error`.
+The filter is sampled: its outputs belong to the current measurement. It starts from a guess and the
+standard deviation of that guess. A target at the origin has no bearing, and is refused. With the
+default values a target rests 1 km away, and the estimate goes there from 280 m off. Look at
+`position` and `range_error`.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ STEP_SIZE, STOP_TIME = 0.5, 50.0
 
 
 class Parameters(NamedTuple):
-    """How the target moves, and how exact the radar is."""
+    """Motion of the target, and accuracy of the radar."""
 
     q: Annotated[float, Variable("m2/s3", "Density of the acceleration", 0.0, tunable=True)] = 1.0
     std_range: Annotated[float, Variable("m", "Standard deviation of a range", POSITIVE)] = 10.0
@@ -42,21 +42,21 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the radar measures."""
+    """Measurements of the radar."""
 
     range: Annotated[float, Variable("m", "Range of the target", 0.0)] = 1000.0
     bearing: Annotated[float, Variable("rad", "Bearing of the target")] = 0.5
 
 
 class State(NamedTuple):
-    """What it predicts for the next measurement."""
+    """Prediction for the next measurement."""
 
     x: Annotated[Vector, 4]  #: position [m] and velocity [m/s]
     P: Annotated[Matrix, 4, 4]  #: covariance of their errors
 
 
 class Outputs(NamedTuple):
-    """What it tells."""
+    """Outputs of the filter."""
 
     position: Annotated[Vector, 2, Variable("m", "Estimated position", members=_XY)]
     velocity: Annotated[Vector, 2, Variable("m/s", "Estimated velocity", members=_XY)]
@@ -64,7 +64,7 @@ class Outputs(NamedTuple):
 
 
 def start(parameters: Parameters) -> State:
-    """State at the start: the target is believed to rest."""
+    """State at the start: the target is assumed to be at rest."""
     a, b = parameters.std_position0, parameters.std_velocity0
     x = Vector((parameters.position0[0], parameters.position0[1], 0.0, 0.0))
     std = Matrix(((a, 0.0, 0.0, 0.0), (0.0, a, 0.0, 0.0), (0.0, 0.0, b, 0.0), (0.0, 0.0, 0.0, b)))
@@ -99,6 +99,6 @@ def update(parameters: Parameters, derived: State, h: float) -> State:
 
 
 def outputs(state: State, derived: State, inputs: Inputs) -> Outputs:
-    """What it tells."""
+    """Outputs of the filter."""
     x, expected = derived.x, sqrt(state.x[0] * state.x[0] + state.x[1] * state.x[1])
     return Outputs(x[:2], x[2:], inputs.range - expected)

@@ -5,17 +5,17 @@
     x_ = F x,  P_ = F P F' + Q                              prediction
 
 The state x is position and velocity. Between two measurements, h seconds apart, the acceleration is
-taken for white noise of the density `q`, and `r` is the standard deviation of a measurement. This
-is the usual model of a target that manoeuvres a little; see Bar-Shalom, Li and Kirubarajan,
+modelled as white noise of the density `q`, and `r` is the standard deviation of a measurement.
+This is the usual model of a target that manoeuvres a little; see Bar-Shalom, Li and Kirubarajan,
 Estimation with Applications to Tracking and Navigation.
 
 A larger `q` makes the filter faster, and its estimate less smooth. Once the start is
-forgotten, only the ratio of `q` to the square of `r` determines the gain. The correction of P has
-the form of Joseph, which keeps P positive whatever is rounded.
+forgotten, only the ratio of `q` to the square of `r` determines the gain. The correction of P is in
+Joseph's form, which keeps P positive in spite of rounding.
 
-The filter is sampled: its outputs belong to the measurement of their time. With the default values
-the target rests at 1 m, and the estimate goes there from 0. Look at `p` and at `std_p`, which tells
-how good the filter believes it to be.
+The filter is sampled: its outputs belong to the current measurement. With the default values the
+target rests at 1 m, and the estimate goes there from 0. Look at `p` and at `std_p`, the standard
+deviation that the filter computes for it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ STEP_SIZE, STOP_TIME = 0.1, 10.0
 
 
 class Parameters(NamedTuple):
-    """How much the target moves, and what is known at the start."""
+    """Motion of the target, and uncertainty at the start."""
 
     q: Annotated[
         float, Variable("m2/s3", "Density of the acceleration", minimum=0.0, tunable=True)
@@ -48,20 +48,20 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What is measured."""
+    """Measurement."""
 
     z: Annotated[float, Variable("m", "Measured position")] = 1.0
 
 
 class State(NamedTuple):
-    """What it predicts for the next measurement."""
+    """Prediction for the next measurement."""
 
     x: Annotated[Vector, 2]  #: position [m] and velocity [m/s]
     P: Annotated[Matrix, 2, 2]  #: covariance of their errors
 
 
 class Outputs(NamedTuple):
-    """What it tells."""
+    """Outputs of the filter."""
 
     p: Annotated[float, Variable("m", "Estimated position")]
     v: Annotated[float, Variable("m/s", "Estimated velocity")]
@@ -91,6 +91,6 @@ def update(parameters: Parameters, derived: State, h: float) -> State:
 
 
 def outputs(derived: State) -> Outputs:
-    """What it tells."""
+    """Outputs of the filter."""
     x, P = derived.x, derived.P
     return Outputs(x[0], x[1], sqrt(P[0, 0]), sqrt(P[1, 1]))

@@ -2,13 +2,13 @@
 
     T dx/dt = u(t - delay) - x,  y = x + noise
 
-The dead time is a line of 50 cells. At the end of each fiftieth of the delay the oldest cell takes
-the present input, and what it held leaves the line. So the delay is exact within one cell, or
-within a step if that is longer. Nothing is moved: only the position of the oldest cell goes around.
-The lag is solved exactly for the value that leaves the line.
+The dead time is a delay line of 50 cells, used as a ring. At the end of each fiftieth of the delay
+the value of the oldest cell leaves the line, and the current input takes its place. So the delay is
+exact within one cell, or within a step if that is longer. The lag is solved exactly for the value
+that leaves the line.
 
-`measured` adds the noise to `y`, from the standard normal number `n`, one in each communication
-step. `seed` says where these numbers start. The same seed gives the same noise in each run.
+`measured` adds the noise to `y`, from the standard normal number `n`, drawn once in each
+communication step. The same `seed` gives the same noise in each run.
 
 Lag with dead time is the standard model of slow processes; see Åström and Hägglund, Advanced PID
 Control. With the default values a step from 20 to 80 degC arrives after 2 s, and `y` has passed
@@ -38,13 +38,13 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What it measures."""
+    """Measured quantity."""
 
     u: Annotated[float, Variable("degC", "Temperature")] = 80.0
 
 
 class State(NamedTuple):
-    """What is on its way."""
+    """Values in the delay line, and the lag."""
 
     line: Annotated[Vector, CELLS]  #: temperatures in the pipe [degC]
     oldest: int  #: place of the oldest of them
@@ -53,7 +53,7 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What it tells."""
+    """Outputs of the sensor."""
 
     x: Annotated[float, Variable("degC", "Temperature of the sensor")]
     y: Annotated[float, Variable("degC", "Measured temperature")]
@@ -82,7 +82,7 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(state: State) -> Outputs:
-    """What it tells, without noise."""
+    """Outputs of the sensor, without noise."""
     return Outputs(state.x, state.x)
 
 

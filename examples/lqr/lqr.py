@@ -10,9 +10,9 @@ over all samples. The gain follows from the discrete algebraic Riccati equation
 
     K = (r + B'P B)^-1 B'P A,  P = Q + A'P (A - B K)
 
-which is iterated from P = Q, once: `derive` takes nothing but the parameters. See Åström and
-Wittenmark, Computer-Controlled Systems. The regulator is sampled, and has no memory. Step it every
-`T` seconds, the period that the gain is made for.
+which is iterated from P = Q. This happens once, because `derive` takes only the parameters. See
+Åström and Wittenmark, Computer-Controlled Systems. The regulator is sampled, and has no memory.
+Step it every `T` seconds, the period for which the gain is computed.
 
 A larger `r` makes the control slower and cheaper. Look at `K_p`, `K_v` and `rounds`, and
 connect `u` to a cart whose position and velocity come back as `p` and `v`.
@@ -33,7 +33,7 @@ STEP_SIZE, STOP_TIME = 0.05, 5.0
 
 
 class Parameters(NamedTuple):
-    """The cart, and what its control costs."""
+    """Cart, and weights of the cost."""
 
     m: Annotated[float, Variable("kg", "Mass of the cart", minimum=POSITIVE)] = 2.0
     T: Annotated[float, Variable("s", "Sampling period", minimum=POSITIVE)] = 0.05
@@ -43,21 +43,21 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What is measured of the cart."""
+    """Measured motion of the cart."""
 
     p: Annotated[float, Variable("m", "Position of the cart")] = 1.0
     v: Annotated[float, Variable("m/s", "Velocity of the cart")] = 0.0
 
 
 class Regulator(NamedTuple):
-    """What follows from the parameters."""
+    """Values that depend on parameters only."""
 
     K: Annotated[Vector, 2]
     rounds: int
 
 
 class Outputs(NamedTuple):
-    """What it does."""
+    """Outputs of the regulator."""
 
     u: Annotated[float, Variable("N", "Force on the cart")]
     K_p: Annotated[float, Variable("N/m", "Gain of the position")]
@@ -88,6 +88,6 @@ def derive(parameters: Parameters) -> Regulator:
 
 
 def outputs(derived: Regulator, inputs: Inputs) -> Outputs:
-    """What it does."""
+    """Outputs of the regulator."""
     K = derived.K
     return Outputs(-(K @ Vector((inputs.p, inputs.v))), K[0], K[1], derived.rounds)

@@ -27,7 +27,7 @@ H_MAX, STOP_TIME = 0.02, 2.0
 
 
 class Parameters(NamedTuple):
-    """The plant, and the error's motion."""
+    """Plant, and motion of the error."""
 
     m: Annotated[float, Variable("kg", "Mass", minimum=POSITIVE)] = 1.0
     d: Annotated[float, Variable("kg/s", "Damping", minimum=0.0)] = 0.5
@@ -37,20 +37,20 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What is known of the plant."""
+    """Force and measurement."""
 
     u: Annotated[float, Variable("N", "Force on the mass")] = 2.0
     y: Annotated[float, Variable("m", "Measured position")] = 0.1
 
 
 class State(NamedTuple):
-    """What it believes."""
+    """Estimate."""
 
     x: Annotated[Vector, 2]  #: estimated position [m] and velocity [m/s]
 
 
 class Outputs(NamedTuple):
-    """What it tells."""
+    """Outputs of the observer."""
 
     p: Annotated[float, Variable("m", "Estimated position")]
     v: Annotated[float, Variable("m/s", "Estimated velocity")]
@@ -81,5 +81,5 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(state: State) -> Outputs:
-    """What it tells."""
+    """Outputs of the observer."""
     return Outputs(state.x[0], state.x[1])

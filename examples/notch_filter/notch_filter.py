@@ -39,20 +39,20 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What it filters."""
+    """Signal to filter."""
 
     u: Annotated[float, Variable("1", "Signal")] = 1.0
 
 
 class State(NamedTuple):
-    """Its memory."""
+    """Memory of the filter."""
 
     s1: float  #: first delayed sum
     s2: float  #: second delayed sum
 
 
 class Coefficients(NamedTuple):
-    """What follows from the parameters."""
+    """Values that depend on parameters only."""
 
     b0: float
     b1: float
@@ -60,7 +60,7 @@ class Coefficients(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What is left."""
+    """Filtered signal."""
 
     y: Annotated[float, Variable("1", "Signal without the frequency")]
 
@@ -91,5 +91,5 @@ def update(state: State, derived: Coefficients, inputs: Inputs) -> State:
 
 
 def outputs(state: State, derived: Coefficients, inputs: Inputs) -> Outputs:
-    """What is left of a sample."""
+    """Output for a sample."""
     return Outputs(derived.b0 * inputs.u + state.s1)

@@ -8,11 +8,10 @@
 This is the form of Åström and Wittenmark, Computer-Controlled Systems. `b` weights the set point,
 which reduces the overshoot. The derivative acts on the measured value only, through a filter of the
 time constant Td / N, and is stepped by the backward rule. It is a sampled controller: `u` belongs
-to the set point and the measured value of its time, and is held until the next.
+to the current set point and measured value, and is held until the next sample.
 
-While the actuator is at a limit, u - v is not zero, and leads the integral back within about `Tt`
-seconds. Without it the integral would wind up, and the controller would react late after the set
-point has been reached.
+While the actuator is at a limit, u - v is not zero, and drives the integral back within about `Tt`
+seconds. Otherwise the integral would wind up, and the output would overshoot the set point.
 
 With the default values nothing responds to `u`, so it rises to its limit and `integral` stops
 rising. Connect `y` to a plant such as DcMotor or WaterTank.
@@ -42,23 +41,23 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What is wanted, and what is measured."""
+    """Set point and measurement."""
 
     r: Annotated[float, Variable("1", "Set point")] = 1.0
     y: Annotated[float, Variable("1", "Measured value")] = 0.0
 
 
 class State(NamedTuple):
-    """Its memory."""
+    """Memory of the controller."""
 
     integral: float
-    derivative: float  #: of the last sample
+    derivative: float  #: derivative part of the last sample
     y: float  #: measured value of the last sample
-    share: float  #: of the derivative that is left after the time since then
+    share: float  #: part of the derivative that remains after the time since then
 
 
 class Outputs(NamedTuple):
-    """What it tells the actuator."""
+    """Outputs of the controller."""
 
     u: Annotated[float, Variable("1", "Output to the actuator")]
     integral: Annotated[float, Variable("1", "Integral part")]
@@ -72,7 +71,7 @@ def check(parameters: Parameters) -> None:
 
 
 def start(inputs: Inputs) -> State:
-    """State at the start: as if the measured value had always been what it is."""
+    """State at the start: the measured value has always been constant."""
     return State(0.0, 0.0, inputs.y, 0.0)
 
 
@@ -99,5 +98,5 @@ def update(
 
 
 def outputs(state: State, derived: tuple[float, float, float]) -> Outputs:
-    """What it tells the actuator."""
+    """Outputs of the controller."""
     return Outputs(derived[2], state.integral, derived[0])

@@ -5,8 +5,9 @@
     auv-fmu build policy/policy.py --kind native --out examples/policy
     auv-fmu run examples/policy/policy.toml
 
-It learns from random states what a saturated PD law would command: a force at the control point,
-which (11) turns into tau. The law measures the velocity, which the paper's controller does not.
+The network learns the commands of a saturated PD law in random states: a force at the control
+point, which (11) turns into tau. The law measures the velocity, which the paper's controller does
+not.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ N_INPUTS = 15
 
 
 def law(e: np.ndarray, de: np.ndarray, dy_d: np.ndarray, euler: np.ndarray) -> np.ndarray:
-    """The commands of the law, row by row."""
+    """Commands of the law, a row for each state."""
     force = MOST * np.tanh((-K_P * e - K_D * de) / MOST) + DRAG * dy_d
     phi, theta, psi = euler.T
     # Rows of the transposed rotation: the axes of the body in the earth frame.
@@ -47,7 +48,7 @@ def law(e: np.ndarray, de: np.ndarray, dy_d: np.ndarray, euler: np.ndarray) -> n
 
 
 def states(random: np.random.Generator, n: int) -> np.ndarray:
-    """What a vehicle near the helix may see: e, de, dy_d, angles."""
+    """Random states of a vehicle near the helix: e, de, dy_d, angles."""
     near = random.random((n, 1)) < 0.7
     e = random.normal(size=(n, 3)) * np.where(near, 0.3, 4.0)
     de = random.normal(size=(n, 3)) * np.where(near, 0.2, 0.8)
@@ -64,7 +65,7 @@ def states(random: np.random.Generator, n: int) -> np.ndarray:
 
 
 def trained(random: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Weights and biases of three layers, by Adam."""
+    """Train three layers by Adam, and return their weights and biases."""
     sizes = (12, NEURONS, NEURONS, 3)
     layers = [[random.normal(size=(m, n)) / np.sqrt(n), np.zeros(m)] for n, m in pairwise(sizes)]
     moments = [[[np.zeros_like(p), np.zeros_like(p)] for p in layer] for layer in layers]
@@ -97,7 +98,7 @@ def trained(random: np.random.Generator) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def main() -> None:
-    """Write the file."""
+    """Train the network and write the file."""
     (W1, b1), *others = trained(np.random.default_rng(1))
     # The differences e = y - y_d and de = dy - dy_d are part of the first layer.
     V1 = np.zeros((NEURONS, N_INPUTS))

@@ -42,7 +42,7 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What it drives over."""
+    """Road."""
 
     road: Annotated[float, Variable("m", "Height of the road")] = 0.05
 
@@ -54,7 +54,7 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the car."""
 
     body: Annotated[float, Variable("m", "Height of the body", feedthrough=())]
     wheel: Annotated[float, Variable("m", "Height of the wheel", feedthrough=())]
@@ -91,6 +91,6 @@ def update(
 def outputs(
     parameters: Parameters, state: State, derived: Annotated[Matrix, 4, 4], inputs: Inputs
 ) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the car."""
     x = state.x
     return Outputs(x[0], x[2], derived[1] @ x, parameters.k_tyre * (inputs.road - x[2]))

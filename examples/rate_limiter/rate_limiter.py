@@ -10,7 +10,7 @@ Control of Systems with Actuator and Sensor Nonlinearities, 1996.
 So `y` depends on where `x` came from, not only on where it is. Backlash makes a loop with
 integral action hunt: it oscillates around its set point.
 
-With the default values the motor runs to 1, and the output follows half a gap behind. Connect a
+With the default values the motor runs to 1, and the output lags by half a gap. Connect a
 sine, and plot `y` over `u`: the loop is as wide as the gap.
 """
 
@@ -24,7 +24,7 @@ STOP_TIME = 10.0
 
 
 class Parameters(NamedTuple):
-    """Its limits, and its gap."""
+    """Limits and gap."""
 
     rising: Annotated[float, Variable("1/s", "Largest rate upwards", 0.0, tunable=True)] = 0.5
     falling: Annotated[float, Variable("1/s", "Largest rate downwards", 0.0, tunable=True)] = 0.5
@@ -33,20 +33,20 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Where it should go."""
+    """Command."""
 
     u: Annotated[float, Variable("1", "Commanded position")] = 1.0
 
 
 class State(NamedTuple):
-    """Where it is."""
+    """Positions of motor and output."""
 
     x: float  #: position of the motor
     y: float  #: position of the output
 
 
 class Outputs(NamedTuple):
-    """Where it is seen."""
+    """Positions of motor and output."""
 
     x: Annotated[float, Variable("1", "Position of the motor")]
     y: Annotated[float, Variable("1", "Position of the output")]
@@ -65,5 +65,5 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(state: State) -> Outputs:
-    """Where it is seen."""
+    """Outputs of the actuator."""
     return Outputs(state.x, state.y)

@@ -22,20 +22,20 @@ STOP_TIME = 10.0
 
 
 class Parameters(NamedTuple):
-    """What may be set."""
+    """Resistance."""
 
     R: Annotated[float, Variable("Ohm", "Resistance", minimum=POSITIVE, tunable=True)] = 10000.0
 
 
 class Inputs(NamedTuple):
-    """The voltages of its pins."""
+    """Voltages of the pins."""
 
     positive_pin_v: Annotated[float, Variable("V", "Voltage of the positive pin")] = 20.0
     negative_pin_v: Annotated[float, Variable("V", "Voltage of the negative pin")] = 10.0
 
 
 class Outputs(NamedTuple):
-    """What follows from them."""
+    """Voltage and currents."""
 
     positive_pin_i: Annotated[float, Variable("A", "Current into the positive pin")]
     negative_pin_i: Annotated[float, Variable("A", "Current into the negative pin")]
@@ -44,7 +44,7 @@ class Outputs(NamedTuple):
 
 
 def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:
-    """What follows from the inputs."""
+    """Voltage and currents, by Ohm's law."""
     delta_v = inputs.positive_pin_v - inputs.negative_pin_v
     i = delta_v / parameters.R
     return Outputs(positive_pin_i=i, negative_pin_i=-i, delta_v=delta_v, i=i)

@@ -37,20 +37,20 @@ STOP_TIME = 10.0
 
 
 class Inputs(NamedTuple):
-    """What the network is asked."""
+    """Angle."""
 
     sin_input: Annotated[float, Variable("rad", "Angle")] = 0.0
 
 
 class Outputs(NamedTuple):
-    """What it answers, and what is right."""
+    """Output of the network, and the exact sine."""
 
     sin_output_tf: Annotated[float, Variable("1", "Sine of the angle by the network")]
     sin_output_ref: Annotated[float, Variable("1", "Sine of the angle")]
 
 
 def outputs(inputs: Inputs) -> Outputs:
-    """What it answers."""
+    """Output of the network, and the exact sine."""
     x = inputs.sin_input
     return Outputs(W3 @ _activated(W2 @ _activated(W1 * x)), sin(x))
 

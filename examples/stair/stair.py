@@ -23,21 +23,21 @@ STEP_SIZE, STOP_TIME = 0.2, 10.0
 
 
 class Parameters(NamedTuple):
-    """Where it starts and ends."""
+    """First and last value."""
 
     start: Annotated[int, Variable("1", "Value at the start", minimum=0)] = 1
     limit: Annotated[int, Variable("1", "Value that it stays at", minimum=0)] = 10
 
 
 class State(NamedTuple):
-    """What has been counted."""
+    """Count, and time of the next one."""
 
     counter: int
     next_event: float  #: when it rises next [s]
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the counter."""
 
     counter: Annotated[int, Variable("1", "Value of the counter")]
 
@@ -57,5 +57,5 @@ def update(parameters: Parameters, state: State, t: float, h: float) -> State:
 
 
 def outputs(state: State) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the counter."""
     return Outputs(state.counter)

@@ -3,12 +3,13 @@
     GREEN -> AMBER -> RED -> RED_AMBER -> GREEN ...
 
 The light is green for the cars until a pedestrian presses the button, and for `green` seconds at
-least. It then runs through the other modes, each for the time that its parameter says. A button
-that is pressed at any time except red is remembered. Pedestrians may walk while the cars have red.
+least. It then runs through the other modes, each for the time of its parameter. A press of the
+button is remembered, except while the cars have red. Pedestrians may walk while the cars have red.
 
 A mode is a member of an `IntEnum`. As a parameter it is a text, such as `red`; as an output it is
 its number. A mode changes at the end of a communication step, so a step should be short compared
-with the times. The time by which it ends late counts towards the next mode: no error adds up.
+with the times. The time by which it ends late counts towards the next mode, so errors do not add
+up.
 
 With the default values the button is held, and the light repeats itself every 22 s. Look at `mode`,
 `walk` and `cycles`.
@@ -28,7 +29,7 @@ STEP_SIZE, STOP_TIME = 0.1, 50.0
 
 
 class Mode(IntEnum):
-    """What the cars see."""
+    """Signal for the cars."""
 
     GREEN = 0
     AMBER = 1
@@ -37,7 +38,7 @@ class Mode(IntEnum):
 
 
 class Parameters(NamedTuple):
-    """How long each mode lasts, and which is the first."""
+    """Duration of each mode, and the first mode."""
 
     green: Annotated[float, Variable("s", "Least time of green", POSITIVE, tunable=True)] = 10.0
     amber: Annotated[float, Variable("s", "Time of amber", POSITIVE, tunable=True)] = 3.0
@@ -47,13 +48,13 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What the pedestrians do."""
+    """Button for pedestrians."""
 
     button: Annotated[bool, Variable("1", "The button is pressed")] = True
 
 
 class State(NamedTuple):
-    """What it remembers."""
+    """Mode, elapsed time and memory of the button."""
 
     mode: Mode
     elapsed: float  #: time in this mode [s]
@@ -62,7 +63,7 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What is seen."""
+    """Outputs of the traffic light."""
 
     mode: Annotated[Mode, Variable("1", "Light for the cars")]
     walk: Annotated[bool, Variable("1", "Pedestrians may walk")]
@@ -95,5 +96,5 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(state: State) -> Outputs:
-    """What is seen."""
+    """Outputs of the traffic light."""
     return Outputs(state.mode, state.mode == Mode.RED, state.cycles)

@@ -27,7 +27,7 @@ H_MAX, STEP_SIZE, STOP_TIME = 0.001, 0.1, 10.0
 
 
 class Parameters(NamedTuple):
-    """The system, and its start."""
+    """Matrices, and state at the start."""
 
     A: Annotated[Matrix, 3, 3, Variable("1/s", "From states to rates", tunable=True)] = IDENTITY
     B: Annotated[Matrix, 3, 3, Variable("1/s", "From inputs to rates", tunable=True)] = IDENTITY
@@ -37,19 +37,19 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What acts on it."""
+    """Inputs of the system."""
 
     u: Annotated[Vector, 3, Variable("1", "Inputs")] = Vector((1.0, 2.0, 3.0))
 
 
 class State(NamedTuple):
-    """What it remembers."""
+    """State of the system."""
 
     x: Annotated[Vector, 3]
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the system."""
 
     y: Annotated[Vector, 3, Variable("1", "Outputs")]
 
@@ -66,5 +66,5 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(parameters: Parameters, state: State, inputs: Inputs) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the system."""
     return Outputs(parameters.C @ state.x + parameters.D @ inputs.u)

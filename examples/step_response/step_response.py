@@ -23,24 +23,24 @@ STOP_TIME = 10.0
 
 
 class Parameters(NamedTuple):
-    """What may be set."""
+    """Gain and time constant."""
 
     a: Annotated[float, Variable("1", "Gain", tunable=True)] = 5.0
     tau: Annotated[float, Variable("s", "Time constant", minimum=POSITIVE, tunable=True)] = 2.0
 
 
 class Inputs(NamedTuple):
-    """The height of the step."""
+    """Height of the step."""
 
     realIn: Annotated[float, Variable("1", "Height of the step at time 0")] = 22.0
 
 
 class Outputs(NamedTuple):
-    """What follows from it."""
+    """Response."""
 
     realOut: Annotated[float, Variable("1", "Response to the step")]
 
 
 def outputs(parameters: Parameters, inputs: Inputs, t: float) -> Outputs:
-    """What follows from the inputs and the time."""
+    """Response at the time t."""
     return Outputs(inputs.realIn * parameters.a * (1.0 - exp(-t / parameters.tau)))

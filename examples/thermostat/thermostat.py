@@ -28,7 +28,7 @@ STEP_SIZE, STOP_TIME = 10.0, 10800.0
 
 
 class Mode(IntEnum):
-    """What the heater does."""
+    """Mode of the heater."""
 
     OFF = 0
     HEATING = 1
@@ -55,13 +55,13 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Room and heater."""
 
-    temperature: float  #: of the room [degC]
+    temperature: float  #: [degC]
     mode: Mode
-    switched: int  #: how often
+    switched: int  #: number of switches
 
 
 class Outputs(NamedTuple):
-    """What is seen of them."""
+    """Outputs of the room and the heater."""
 
     temperature: Annotated[float, Variable("degC", "Temperature of the room")]
     heating: Annotated[bool, Variable("1", "The heater is on")]
@@ -88,5 +88,5 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(state: State) -> Outputs:
-    """What is seen of them."""
+    """Outputs of the room and the heater."""
     return Outputs(state.temperature, state.mode == Mode.HEATING, state.switched)

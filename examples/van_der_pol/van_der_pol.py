@@ -24,7 +24,7 @@ H_MAX, STEP_SIZE, STOP_TIME = 0.01, 0.01, 20.0
 
 
 class Parameters(NamedTuple):
-    """The damping, and the start."""
+    """Damping and start."""
 
     mu: Annotated[float, Variable("1", "Strength of the damping", minimum=0.0, tunable=True)] = 1.0
     x0_start: Annotated[float, Variable("1", "Deflection at the start")] = 2.0
@@ -32,14 +32,14 @@ class Parameters(NamedTuple):
 
 
 class State(NamedTuple):
-    """Its motion."""
+    """Motion of the oscillator."""
 
     x0: float  #: deflection
     x1: float  #: its rate [1/s]
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the oscillator."""
 
     x0: Annotated[float, Variable("1", "Deflection")]
     x1: Annotated[float, Variable("1/s", "Rate of the deflection")]
@@ -58,5 +58,5 @@ def update(parameters: Parameters, state: State, h: float) -> State:
 
 
 def outputs(state: State) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the oscillator."""
     return Outputs(state.x0, state.x1)

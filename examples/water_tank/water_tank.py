@@ -35,19 +35,19 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What flows in."""
+    """Inflow."""
 
     inflow: Annotated[float, Variable("m3/s", "Flow into the tank", minimum=0.0)] = 0.00316
 
 
 class State(NamedTuple):
-    """What it contains."""
+    """Level."""
 
     level: float  #: above the hole [m]
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the tank."""
 
     level: Annotated[float, Variable("m", "Level above the hole")]
     outflow: Annotated[float, Variable("m3/s", "Flow through the hole")]
@@ -71,5 +71,5 @@ def update(parameters: Parameters, state: State, derived: float, inputs: Inputs,
 
 
 def outputs(parameters: Parameters, state: State, derived: float) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the tank."""
     return Outputs(state.level, derived, state.level >= parameters.rim)

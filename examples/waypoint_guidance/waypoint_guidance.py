@@ -28,7 +28,7 @@ H_MAX, STEP_SIZE, STOP_TIME = 0.02, 0.1, 100.0
 
 
 class Parameters(NamedTuple):
-    """The path, and how it is followed."""
+    """Path and guidance."""
 
     path: Annotated[Matrix, COUNT, 2, Variable("m", "Waypoints, one a row")] = SQUARE
     lookahead: Annotated[float, Variable("m", "Distance to steer for", POSITIVE)] = 2.0
@@ -38,13 +38,13 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """How fast it drives."""
+    """Speed."""
 
     speed: Annotated[float, Variable("m/s", "Speed", minimum=0.0)] = 1.0
 
 
 class State(NamedTuple):
-    """Where it is."""
+    """Position, heading and waypoint."""
 
     position: Annotated[Vector, 2]  #: [m]
     heading: float  #: anticlockwise from x [rad]
@@ -52,7 +52,7 @@ class State(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs of the robot."""
 
     position: Annotated[Vector, 2, Variable("m", "Position", members=XY)]
     heading: Annotated[float, Variable("rad", "Heading, anticlockwise from x")]
@@ -102,6 +102,6 @@ def update(
 
 
 def outputs(state: State, derived: tuple[float, float, float]) -> Outputs:
-    """What is seen of it."""
+    """Outputs of the robot."""
     number, arrived = min(state.waypoint + 1, COUNT), state.waypoint == COUNT
     return Outputs(state.position, state.heading, derived[1], number, arrived)

@@ -29,7 +29,7 @@ class PathTable(TomlTable):
         '"path.csv"',
     )
     component: str = entry(
-        "The [PathPlanner](components/PathPlanner.md) whose parameters they become.",
+        "The [PathPlanner](../../fmus/path_planner/page.md) whose parameters they become.",
         f"`{STANDARD.planner}`",
     )
 

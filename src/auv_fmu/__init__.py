@@ -4,35 +4,34 @@
     result = simulate("fig4", {"plant.noise.std": 0.0})
     result.plot("plant.eta.*")
 
-`simulate`, `load`, `read`, `sweep` and `Result` are those of :mod:`orchestrator`, imported on first
-use. The rooms below hold the equations, one module per subject.
+`simulate`, `load`, `read`, `sweep` and `Result` come from :mod:`orchestrator`, imported on first
+use. The subpackages below hold the equations, one module per subject.
 
 The paper is "Three-dimensional tracking control of autonomous underwater vehicles with
 limited torque and without velocity sensors". Equation numbers in this package are its own.
 
 ================  ========================================================================
-room              what it states
+subpackage        contents
 ================  ========================================================================
-:mod:`.language`  what equations are written with: declarations, vectors, random numbers
+:mod:`.language`  elements of equations: declarations, vectors, random numbers
 :mod:`.paper`     the paper's vehicle, reference, disturbance and controllers
-:mod:`.proof`     what only the paper's proof needs; never runs inside an FMU
+:mod:`.proof`     quantities that only the paper's proof needs; not part of any FMU
 :mod:`.remus`     the REMUS 100, not in the paper
 :mod:`.water`     waves and currents of a sea, not in the paper
 :mod:`.guidance`  paths through waypoints, formations and their messages, not in the paper
-:mod:`.loop`      Fig. 2 as one straight line, with all of these
+:mod:`.loop`      Fig. 2 as straight-line Python, with all of these
 ================  ========================================================================
 
-Each imports only what stands above it in this table, and names its modules in one of its own.
+Each imports only from those above it, and lists its modules in its own docstring.
 
-The functions take and return Python floats and tuples and import nothing but the standard
-library, because they run inside FMUs in hosts that may have no numpy. `architecture.md`
-says why that form was chosen, with the measurements.
+The functions take and return Python floats and tuples and import only the standard library,
+because they run inside FMUs in hosts that may have no numpy. `architecture.md` explains why.
 
 Symbols are the paper's: dx and ddx are the first and second time derivative of x, x_hat is its
-estimate, s_z is s(z). lambda_ is lambda, which Python keeps for itself.
+estimate, s_z is s(z). lambda_ is lambda, a keyword of Python.
 
-Arguments come in one order: sets of parameters, states and signals, single parameters such as
-ell and lambda, the step h.
+The order of arguments is: sets of parameters, states and signals, single parameters such as ell and
+lambda, the step h.
 
 Conventions: SI units; north-east-down earth frame E (reading 16); body frame B with x forward, y to
 starboard, z down; tuples are in the order of the paper's vectors.
@@ -50,13 +49,13 @@ if TYPE_CHECKING:
 
 __all__ = ["POSITIVE", "Matrix", "Refusal", "Variable", "Vector", "interpolate", "solve"]
 
-# The copy of this package within an FMU has another name, and nothing but the equations.
+# The copy of this package in an FMU has another name, and only the equations.
 if __name__ == "auv_fmu":
     __all__ += ["Result", "load", "read", "simulate", "sweep"]
 
 __version__ = "0.1.0"
 
-#: Where the components come from, and what their equation numbers refer to.
+#: Origin of the components, and the paper to which their equation numbers refer.
 __author__ = "auv-fmu"
 __license__ = "MIT"
 __citation__ = (
@@ -73,5 +72,5 @@ def __getattr__(name: str) -> object:
     """Import a name of the product on first use; equations need neither numpy nor a master."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    # For a reader of import statements, such as the build of an FMU, there is nothing to import.
+    # Not an import statement: the build of an FMU would follow it.
     return getattr(import_module("orchestrator"), name)

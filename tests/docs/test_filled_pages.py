@@ -1,4 +1,4 @@
-"""What tools/pages.py writes is what is committed."""
+"""The committed files are the output of tools/pages.py."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from support.markdown import DOCS, blocks
 FILES = files()
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(DOCS).as_posix())
+@pytest.mark.parametrize("path", FILES, ids=lambda path: path.relative_to(DOCS.parent).as_posix())
 def test_file_is_what_the_code_says(path: Path):
     assert path.read_text(encoding="utf-8") == FILES[path], "run `python tools/pages.py`"
 
@@ -38,7 +38,7 @@ def validator(kind: str) -> Draft202012Validator:
 
 
 def ready(kind: str) -> list[str]:
-    """The files that come with the program, and those of the page."""
+    """Files that come with the program, and files on the page."""
     folder = {"scenario": runs.SCENARIOS_FOLDER, "study": study.STUDIES_FOLDER}[kind]
     page = DOCS / {"scenario": "reference/scenario-files.md", "study": "how-to/studies.md"}[kind]
     files = [file.read_text(encoding="utf-8") for file in folder.glob("*.toml")]

@@ -42,7 +42,7 @@ EXTRAS = {" hosts ": ("libcosimpy", "ecospy"), "policy": ("onnx",)}
 
 
 def network(path: Path) -> None:
-    """A policy as training leaves it."""
+    """A trained policy."""
     onnx, random = pytest.importorskip("onnx"), np.random.default_rng(1)
     make, row = onnx.helper, onnx.TensorProto.FLOAT
     known = [
@@ -82,7 +82,7 @@ def test_page_of_the_form_names_all_of_it():
 # Once in a process: the page makes a module that is then known, and refuses a second of its name.
 @pytest.fixture(scope="session")
 def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """A folder in which everything on the page was done, and what was printed."""
+    """A folder in which everything on the page was done, and the output."""
     folder, said = tmp_path_factory.mktemp("component"), io.StringIO()
     before = [*sys.path]
     with pytest.MonkeyPatch.context() as here, redirect_stdout(said):
@@ -119,7 +119,7 @@ def test_both_kinds_give_the_same_table(followed: tuple[Path, str]):
 
 
 def test_other_hosts_give_the_same_numbers(followed: tuple[Path, str]):
-    """fmpy here; those of the page say how far they are off."""
+    """In fmpy; the table on the page has the deviations of other hosts."""
     folder, said = followed
     rows = [
         fmpy.simulate_fmu(
@@ -156,7 +156,7 @@ def test_other_machines_give_the_same_numbers(
     followed: tuple[Path, str], release: dict[str, Path], tmp_path: Path, machine: str,
     platform: str, ending: str, tool: str | None, tolerance: float,
 ):  # fmt: skip
-    """A host in C, without Python. A release has made zig's own libraries for all machines."""
+    """A host in C, without Python."""
     if tool is None or (tool == QEMU and not ARM_LIBRARIES.is_dir()):
         pytest.skip(f"nothing runs programs of {machine} here")
     folder, _ = followed

@@ -53,7 +53,7 @@ def final_error(folder: Path) -> list[float]:
 
 
 def test_law_of_the_guide_follows_the_reference(followed: Path):
-    """Within what the page says: at first, with an integral, and with a sixth of the gain."""
+    """Within the numbers of the page: at first, with an integral, and with a sixth of the gain."""
     assert max(final_error(followed / "script/results")) == pytest.approx(0.046, abs=5e-4)
     assert max(final_error(followed / "my_law/results")) == pytest.approx(0.020, abs=5e-4)
     assert max(final_error(followed / "my_law/soft")) > 0.2
@@ -102,7 +102,7 @@ def test_both_forms_give_the_same_motion(workplace: Path):
     ],
 )
 def test_law_to_begin_with_arrives_from_elsewhere(workplace: Path, settings: dict[str, float]):
-    """Also with a sensor a hundred times as bad, and if it is told nothing of the vehicle."""
+    """Also with a sensor a hundred times as bad, and without parameters of the vehicle."""
     new_controller("my_law", Path())
     result = simulate("my_law.toml", settings)
     assert max(result.metrics()["final_error"]) < 0.08
@@ -133,7 +133,7 @@ def test_mistake_in_a_script_is_told_with_its_line(text, complaint, tmp_path, ca
     ],
 )
 def test_mistake_in_a_step_is_told_once_with_its_line(options, isolated, workplace, capsys):
-    """One that shows after half a second, in a module beside the script; rows until then stay."""
+    """A mistake after half a second, in a module of the same folder; earlier rows stay."""
     assert main(["new", "controller", "my_law", ".", *options]) == 0
     Path("beside.py").write_text("def waiting(t):\n    return t < 0.5 or value\n")
     script = Path("my_law.py")
@@ -158,7 +158,7 @@ def test_mistake_in_a_step_is_told_once_with_its_line(options, isolated, workpla
 
 
 def built_with(old: str, new: str) -> int:
-    """Build a controller with another text in it; the number of that text's last line."""
+    """Build a controller with a changed text; return the number of the last line of that text."""
     assert main(["new", "controller", "my_law", ".", "--python"]) == 0
     script = Path("my_law.py")
     before, found, after = script.read_text().partition(old)
@@ -168,7 +168,7 @@ def built_with(old: str, new: str) -> int:
     return (before + new).count("\n")
 
 
-def test_mistake_in_the_first_step_is_all_that_is_told(workplace, capsys):
+def test_mistake_in_the_first_step_is_the_only_message(workplace, capsys):
     """No figures and no indices of a run that has made no step."""
     line = built_with("        value = self.values\n", "        value = self.valu\n")
     capsys.readouterr()
@@ -185,7 +185,7 @@ def test_mistake_in_the_first_step_is_all_that_is_told(workplace, capsys):
     [("get()", "if self.filtered: nothing", 1), ("put(value)", "nothing", 2)],
 )
 def test_mistake_in_a_value_is_told_with_its_line(workplace, capsys, head, mistake, status):
-    """Where a plain slave gives or takes a value; PythonFMU alone ends with fmi2Fatal."""
+    """While a plain slave gets or sets a value, where plain PythonFMU ends with fmi2Fatal."""
     head = f"        def {head}:\n"
     line = built_with(head, f"{head}            {mistake}\n")
     capsys.readouterr()
@@ -196,7 +196,7 @@ def test_mistake_in_a_value_is_told_with_its_line(workplace, capsys, head, mista
 
 
 def test_changed_script_runs_changed_in_the_same_process(workplace):
-    """Modules beside the script are in the FMU, and those of two versions do not meet."""
+    """Modules in the folder of the script are in the FMU; two versions of one do not meet."""
     assert main(["new", "controller", "two_versions", ".", "--python"]) == 0
     script = Path("two_versions.py")
     text = script.read_text().replace(
@@ -213,7 +213,7 @@ def test_changed_script_runs_changed_in_the_same_process(workplace):
 
 @pytest.mark.slow
 def test_many_instances_of_a_plain_slave_in_one_process(workplace):
-    """PythonFMU alone crashes the process after some dozens."""
+    """A plain FMU of PythonFMU crashes the process after some dozens."""
     assert main(["new", "controller", "Often", ".", "--python"]) == 0
     code = (
         "from orchestrator import simulate\n"

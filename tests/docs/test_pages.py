@@ -17,7 +17,7 @@ from support.markdown import DOCS, blocks
 
 ROOT = DOCS.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md"), *ROOT.glob("fmus/*/page.md")])
 
 
 def commands() -> dict[str, argparse.ArgumentParser]:

@@ -1,4 +1,4 @@
-"""What is wrong in the paper: the page is in the report, its numbers hold, and tests show it."""
+"""Errors of the paper: the page is in the report, its numbers hold, and tests show each point."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_the_report_has_the_page_without_its_marks_and_without_links_out_of_it()
 
 
 def test_v_rises_from_zero():
-    """Of Fig. 4 on its reference, without noise: V but for its last term, which is not negative.
+    """V of Fig. 4 without noise, on its reference, without the last term, which is not negative.
 
     With theta_0 = theta the last term is zero at first, whatever theta is.
     """
@@ -95,7 +95,7 @@ def test_sway_and_heave_depend_on_controller_and_start():
 
 @given(limit=st.floats(100.0, 1e6))
 def test_rho_hat_takes_the_command_beyond_any_limit(limit):
-    """A metre from the reference, at rest, with a theta_0 of that size."""
+    """A metre from the reference, at rest, with a large theta_0."""
     gains = Gains(theta_0=(limit + 100.0, 0.0, 0.0, 0.0))
     here, there = (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     measured = Measurement(here, there, there, there, there)
@@ -117,7 +117,7 @@ def test_the_helix_is_not_bounded():
 
 
 def test_remark_5_in_figure_4():
-    """Twice the rate of z over the estimate below (21), in per cent."""
+    """Ratio of twice the rate of z to the estimate below (21) [%]."""
     text = text_of("(38) rests on an approximation")
     found = []
     for setting in (QUIET, PAPER):
@@ -136,7 +136,7 @@ def test_remark_5_in_figure_4():
 
 
 def peak(lambda_, h=PAPER.h, gamma=1.0):
-    """Largest surge command of Fig. 4 without noise [N]; it comes within the first seconds."""
+    """Largest surge command of Fig. 4 without noise [N], in the first seconds."""
     gains = Gains(lambda_=lambda_, gamma=gamma)
     setting = QUIET._replace(controller=gains, h=h, h_max=LongestSteps())
     return max(abs(instant.command[0]) for instant in closed_loop(round(4.0 / h), setting))
@@ -169,7 +169,7 @@ def test_surge_efforts_cannot_be_smaller():
         assert least[-1] <= np.sqrt(square)
     assert tells(text, [f"{effort:.0f}" for effort in least])
     assert least[0] > EFFORT_PROPOSED[0] and least[1] > EFFORT_PD[0]
-    # Where the bound of the sum, least / sqrt(h T_f), is what is printed.
+    # T_f at which the bound of the sum, least / sqrt(h T_f), equals the printed number.
     free = np.square(np.divide(least, (EFFORT_PROPOSED[0], EFFORT_PD[0]))) / PAPER.h
     assert tells(text, [f"{duration:.0f}" for duration in free])
 
@@ -191,7 +191,7 @@ def test_pd_efforts_belong_to_the_step():
 
 
 def test_the_circle_is_the_one_of_2():
-    """v and u follow from r in (2) at rest; what is left is a polynomial of fifth degree in r."""
+    """v and u follow from r in the steady (2), which leaves a polynomial of fifth degree in r."""
     text = text_of("4.1: the quoted turning radius has the size of the diameter")
     m11, m22, d11, d22, d66 = 25.0, 17.5, 30.0, 30.0, 20.0
     inverse_of_u = np.array([m11 * m22 / d22, 0.0, d11]) / 80.0

@@ -1,4 +1,4 @@
-"""What README and the page behind it say of the paper, held against runs without noise and with it.
+"""Statements of README and its pages on the paper, compared with runs with and without noise.
 
 `SAID` has README's words and numbers, each with the runs that show it.
 """
@@ -34,7 +34,7 @@ PAGE = DOCS / "explanation" / "reproduction.md"
 
 PROPOSED, PD = ("fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c"), ("fig5-pd", "fig6-pd")
 
-#: What noise of 1 mm takes beyond the limits within the figures: single steps.
+#: Figures in which noise of 1 mm takes single steps beyond the limits.
 TOUCHED = ("fig6", "fig7c")
 
 Values = Mapping[str, Any]
@@ -42,7 +42,7 @@ Values = Mapping[str, Any]
 
 @cache
 def metrics(name: str, seed: int, stop_time: float | None = None, **gains: float) -> Values:
-    """Of a run; seed 0: without noise."""
+    """Metrics of a run; seed 0: without noise."""
     noise = {"plant.noise.std": 0.001 * (seed > 0), "plant.noise.seed": max(seed, 1)}
     changed = {f"controller.{gain}": value for gain, value in gains.items()}
     return simulate(name, {**noise, **changed}, stop_time=stop_time, kind="native").metrics()
@@ -59,18 +59,18 @@ def largest_share(*names: str, seed: int) -> float:
 
 
 def roughness(seed: int) -> np.ndarray:
-    """Total variation of PD in Fig. 5 over that of the proposed controller."""
+    """Ratio of the total variations of both controllers in Fig. 5, PD over proposed."""
     proposed, pd = column("total_variation", "fig5", "fig5-pd", seed=seed)
     return pd / proposed
 
 
 def parts(index: str, printed: tuple[tuple[float, ...], ...], seed: int) -> np.ndarray:
-    """An index of both controllers in Fig. 5 over what the paper prints."""
+    """An index of both controllers in Fig. 5, relative to the printed one."""
     return np.divide(column(index, "fig5", "fig5-pd", seed=seed), printed)
 
 
 def ranges(seed: int) -> list[float]:
-    """Of efforts and of final errors in parts of the printed ones, with two digits."""
+    """Ranges of efforts and final errors, relative to the printed ones, with two digits."""
     efforts = parts("l2_effort", (EFFORT_PROPOSED, EFFORT_PD), seed)
     errors = parts("final_error", (FINAL_ERROR_PROPOSED, FINAL_ERROR_PD), seed)
     both = (efforts.min(), efforts.max(), errors.min(), errors.max())
@@ -96,7 +96,7 @@ def adds_up(seed: int) -> bool:
 
 
 class Said(NamedTuple):
-    """Words of README, and whether a run without noise (seed 0), or a draw of it, shows them."""
+    """Words of README, and a function that checks them in a run (seed 0: without noise)."""
 
     words: str
     quiet: Callable[[], bool] | None
@@ -192,13 +192,13 @@ def test_readme_is_true_in_every_draw_of_the_noise(said: Said, seeds: range):
 
 
 def rows() -> dict[str, list[str]]:
-    """The table of peaks behind README, by the scenario and its eps_t."""
+    """Table of peaks on the page, by figure."""
     [table] = [one for one in sections(PAGE) if one.header[0] == "figure"]
     return {row[0]: row[1:] for row in table.rows}
 
 
 def scenario_of(figure: str) -> tuple[str, dict[str, float]]:
-    """Of `7(a)`, `6, PD` or `5, with eps_t = 1`: its name, and gains."""
+    """Scenario and gains of a figure such as `7(a)`, `6, PD` or `5, with eps_t = 1`."""
     name = "fig" + re.sub(r"[()]", "", figure.split(",", maxsplit=1)[0])
     return name + "-pd" * figure.endswith("PD"), {"eps_t": 1.0} if "eps_t" in figure else {}
 
@@ -210,7 +210,7 @@ def values(cell: str) -> list[float]:
 
 @pytest.mark.parametrize("figure", rows())
 def test_table_of_peaks_is_what_runs_give(figure: str):
-    """Draws lie below the largest of 1,000, and their medians near the median."""
+    """Draws are below the largest of 1,000, and their medians near the median."""
     quiet, median, largest, draws, share = rows()[figure]
     name, gains = scenario_of(figure)
     found = [metrics(name, seed, **gains) for seed in range(5)]

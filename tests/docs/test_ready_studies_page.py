@@ -13,7 +13,7 @@ from orchestrator.runs.scenario import names
 from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
-from parts.gallery import PICTURES
+from pages import PICTURES
 from support.markdown import DOCS
 
 PAGE = DOCS / "explanation" / "ready-studies.md"

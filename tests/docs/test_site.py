@@ -1,4 +1,4 @@
-"""The site: built strictly, whole without a network, and found out what newcomers ask."""
+"""The site: built strictly, complete without a network, with answers to newcomers' questions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ LIVE = "live.html"
 HERE = Path(__file__).parent
 QUESTIONS = tomllib.loads((HERE / "questions.toml").read_text(encoding="utf-8"))
 
-#: Of how many pages, as the search lists them, one has the answer.
+#: Number of pages at the top of the search among which the answer is.
 FIRST = 5
 
 
@@ -44,7 +44,7 @@ def site(tmp_path_factory) -> Path:
 
 @pytest.fixture(scope="module")
 def pages(site) -> dict[str, html.HtmlElement]:
-    """By their address in the site."""
+    """Pages by their address in the site."""
     paths = (path for path in site.rglob("*.html") if path.name not in ("404.html", LIVE))
     return {path.relative_to(site).as_posix(): html.parse(path).getroot() for path in paths}
 

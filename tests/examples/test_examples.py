@@ -23,19 +23,19 @@ REFERENCE = Path(__file__).parent / "reference"
 
 
 def reference(name: str) -> dict[str, list[float]]:
-    """A published result: its columns."""
+    """Columns of a published result."""
     lines = (REFERENCE / f"{name}.csv").read_text().splitlines()
     rows = list(csv.DictReader(line for line in lines if not line.startswith("#")))
     return {column: [float(row[column]) for row in rows] for column in rows[0]}
 
 
 def near(found: Any, expected: Any, *, atol: float = 0.0, rtol: float = 0.0) -> bool:
-    """Whether all numbers are within a tolerance of what they should be."""
+    """True if all numbers are within a tolerance of the expected ones."""
     return bool(np.allclose(found, expected, rtol, atol))
 
 
 def solution(rate: Any, x0: Any, times: Any) -> Any:
-    """States at times, by an integration that is much more exact than what it is compared with."""
+    """States at times, by a much more exact integration than the tested one."""
     found = solve_ivp(rate, (times[0], times[-1]), x0, "DOP853", times, rtol=1e-11, atol=1e-12)
     return found.y
 
@@ -60,7 +60,7 @@ def test_is_short_and_does_something_with_its_defaults(name: str) -> None:
     assert module.__doc__ and 8 <= len(module.__doc__.splitlines()) <= 25
     seen = run(module, stop_time=20.0, step=0.02)
     del seen["time"]
-    # What has no memory gives a constant with constant inputs.
+    # A component without a state is constant with constant inputs.
     moving = hasattr(module, "State")
     assert any(len(set(values)) > 1 for values in seen.values()) >= moving
 
@@ -95,7 +95,7 @@ def test_van_der_pol_is_the_reference_fmu() -> None:
     assert seen["x1"][::20] == published["x1"]
 
 
-def test_van_der_pol_is_the_solution_but_for_the_step() -> None:
+def test_van_der_pol_approaches_the_solution_with_the_step() -> None:
     # The rule is of first order: the error falls with h_max.
     for h_max, error in ((1e-3, 0.03), (1e-4, 0.003)):
         seen = run(load("van_der_pol"), {"h_max": h_max}, stop_time=10.0, step=0.1)
@@ -142,7 +142,7 @@ def test_state_space_is_the_solution_of_any_system() -> None:
 # Components of PythonFMU's examples: their formulas, evaluated here.
 
 
-def test_resistor_is_that_of_pythonfmu() -> None:
+def test_resistor_has_the_values_of_pythonfmu() -> None:
     module = load("resistor")
     seen = run(module, stop_time=1.0, step=0.1)
     # The values that PythonFMU's component has before and after its first step.
@@ -153,7 +153,7 @@ def test_resistor_is_that_of_pythonfmu() -> None:
     assert seen["i"] == [-0.2, -9.75 / 50, -9.5 / 50, -9.25 / 50, -0.18]
 
 
-def test_step_response_is_that_of_pythonfmu() -> None:
+def test_step_response_has_the_values_of_pythonfmu() -> None:
     seen = run(load("step_response"), stop_time=10.0, step=0.1)
     expected = 22.0 * 5.0 * -np.expm1(-np.array(seen["time"]) / 2.0)
     assert near(seen["realOut"], expected, rtol=1e-13, atol=1e-13)
@@ -276,7 +276,7 @@ def test_luenberger_observer_forgets_its_error_as_wanted() -> None:
     L[1] = omega**2 - k / m - d / m * L[0]
     assert near(np.sort(np.linalg.eigvals(A - np.outer(L, C))), np.sort(wanted), rtol=1e-12)
     x = held(A - np.outer(L, C), np.column_stack([[0.0, 1.0], L]), [0, 0], [2.0, 0.1], 0.02, 100)
-    # Runge-Kutta of fourth order: (omega h)^4 of what changes.
+    # Runge-Kutta of fourth order: a relative error of (omega h)^4.
     assert near(np.transpose([seen["p"], seen["v"]]), x, atol=1e-8)
     assert seen["p"][-1] == pytest.approx(0.1, abs=1e-6)
 
@@ -405,7 +405,7 @@ def test_state_machine_keeps_its_times() -> None:
         assert mode == sum(past >= end for end in (10.0, 13.0, 21.0)), t
         assert walk == (mode == module.Mode.RED)
         assert cycles == int((t + 1e-6) // 22.0)
-    # Nobody presses the button; then one short press at 30 s is enough, for one cycle.
+    # The button is never pressed; then one short press at 30 s is enough, for one cycle.
     waiting = run(module, {}, lambda t: {"button": 30.0 <= t < 30.05}, stop_time=80.0, step=0.1)
     changes = [
         (round(t, 1), int(b))

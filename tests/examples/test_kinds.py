@@ -34,7 +34,7 @@ each = pytest.mark.parametrize("name", [*QUICK, *slow(*(n for n in NAMES if n no
 
 @pytest.fixture(scope="session")
 def fmu(shared: Path) -> Callable[..., Path]:
-    """Builds an example's FMU, unless another test has done so."""
+    """Build an example's FMU, unless another test has done so."""
 
     def built(name: str, kind: str, fmi: str = "2") -> Path:
         folder = shared / "examples" / f"{kind}{fmi}" / name
@@ -49,7 +49,7 @@ def fmu(shared: Path) -> Callable[..., Path]:
 
 
 def outputs(path: Path) -> list[str]:
-    """Names of the outputs of an FMU, all but `fault`."""
+    """Names of the outputs of an FMU, without `fault`."""
     variables = fmpy.read_model_description(str(path)).modelVariables
     names = [one.name for one in variables if one.causality == "output"]
     return [name for name in names if name != FAULT.name]
@@ -97,7 +97,7 @@ def test_fmu_agrees_with_the_results_that_it_carries(fmu, capsys, kind: str):
 
 @each
 def test_committed_reference_is_what_the_tool_writes(fmu, tmp_path: Path, name: str):
-    """To 1e-9: the libraries of mathematics of two machines may differ in the last place."""
+    """To 1e-9: mathematical functions of two machines may differ in the last place."""
     written = write_component_reference(
         fmu(name, NATIVE), tmp_path, example_span(fmu(name, NATIVE))
     )

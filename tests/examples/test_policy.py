@@ -19,7 +19,7 @@ from support.examples import EXAMPLES
 @pytest.mark.slow
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 def test_network_finds_the_helix_of_fig_4(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """Within 20 cm and the limits; the page says what it is on one machine."""
+    """Within 20 cm and the limits."""
     monkeypatch.chdir(tmp_path)
     shutil.copyfile(EXAMPLES / "policy/policy.toml", "policy.toml")
     # Several threads for such small matrices only wait for each other.

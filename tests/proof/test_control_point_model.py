@@ -140,7 +140,7 @@ def acceleration(theta, psi, nu, tau, tau_w):
     tau=vectors(forces, 3),
     tau_w=vectors(forces, 5),
 )
-def test_equation_15_holds_with_what_d_lacks(theta, psi, nu, tau, tau_w):
+def test_equation_15_holds_with_the_missing_term_of_d(theta, psi, nu, tau, tau_w):
     u, v, w, q, r = nu
     at, unactuated = (VEHICLE, theta, psi), np.array([v, w])
     in_body = (u, v, w, 0.0, q, r)
@@ -184,7 +184,7 @@ def test_what_d_lacks_is_linear_in_dy_and_in_w(theta, psi, w, dy, k):
 
 @given(theta=pitch_angles, psi=angles, w=vectors(speeds, 2), ell=lengths)
 def test_drift_does_not_depend_on_the_attitude(theta, psi, w, ell):
-    """J^-1 J_delta, which (15) has a derivative by eta of, and by w."""
+    """J^-1 J_delta, whose derivatives by eta and w are in (15)."""
     found = np.linalg.solve(J(theta, psi, ell), J_delta(theta, psi, np.array(w)))
     np.testing.assert_allclose(found, drift(ell) @ w, atol=1e-12 / ell)
 
@@ -210,7 +210,7 @@ def test_p2_1_inertia_is_symmetric_and_bounded(theta, psi, x, ell):
 
 @given(theta=pitch_angles, psi=angles, dy=vectors(speeds, 3), x=vectors(speeds, 3))
 def test_p2_2_rate_of_inertia_minus_twice_coriolis_is_skew(theta, psi, dy, x):
-    """With the attitude turning as it does without sway and heave, as C_2 has it."""
+    """For an attitude that turns as without sway and heave, as in C_2."""
     *_, dtheta, dpsi = kinematic_matrix(theta, psi) @ np.linalg.solve(J(theta, psi, ELL), dy)
     h = 1e-6
     M_2_dot = M_2(VEHICLE, theta + h * dtheta, psi + h * dpsi, ELL)
@@ -257,7 +257,7 @@ def test_p2_3_fails_for_other_velocities():
 
 
 def test_no_c_2_has_both_p2_2_and_p2_3():
-    """P2.3 leaves one that is linear in the velocity, by polarisation, and it has not P2.2.
+    """P2.3 determines a C_2 that is linear in the velocity, by polarisation, and P2.2 fails for it.
 
     C(x) y = (C_2(x) y + C_2(y) x) / 2 has the product C_2(dy) dy of (15). Under surge alone M_2 is
     at rest, so P2.2 asks for y^T C(x) y = 0: it is -m66 / (2 ell^3).
@@ -340,7 +340,7 @@ def test_p2_5_fails_for_an_unbounded_velocity(speed):
     x_2=vectors(speeds, 3),
 )
 def test_p2_5_holds_for_a_bounded_second_velocity(theta, psi, w, x_1, x_2):
-    """Which is all that (26) and (29) need: x_2 = dy_r there, and |dy_r| is bounded by (16).
+    """(26) and (29) need no more: x_2 = dy_r there, and |dy_r| is bounded by (16).
 
     d = L(w) dy + Q(dy) with a quadratic Q, |Q(h)| <= k |h|^2 / 2: so the change of d is
     L(w) h + DQ(x_2) h + Q(h), within (|L(w)| + k |x_2|) |h| + k |h|^2 / 2.
@@ -386,12 +386,12 @@ three = vectors(speeds, 3)
     force=vectors(forces, 3),
     tau_w2=vectors(forces, 3),
 )
-def test_error_dynamics_are_those_of_15_but_for_p2_3(
+def test_error_dynamics_follow_from_15_except_for_p2_3(
     theta, psi, w, dy_r, ddy_r, r_1, r_2, force, tau_w2
 ):
-    """M_2 dr_1/dt of (15) is that of (20); that less k_d M_2 r_2 is (28).
+    """M_2 dr_1/dt of (15) equals (20); less k_d M_2 r_2 it is (28).
 
-    Each is so but for C_2(x_1) x_2 - C_2(x_2) x_1, which P2.3 takes to be zero.
+    Both hold except for C_2(x_1) x_2 - C_2(x_2) x_1, which P2.3 takes to be zero.
     """
     at = (VEHICLE, theta, psi)
     w, dy_r, ddy_r, r_1, r_2, force, tau_w2 = map(
@@ -449,7 +449,7 @@ def test_15_needs_one_more_term():
         )
 
     def vanishes(x):
-        """Whether all entries are zero; r / cos(theta) is their only quotient."""
+        """True if all entries are zero; r / cos(theta) is their only quotient."""
         plain = dict(zip((c_theta, s_theta, c_psi, s_psi), sp.symbols("a b c d"), strict=True))
         a, b, c, d = plain.values()
         for entry in x:

@@ -1,4 +1,4 @@
-"""Bounds of references in a formation: how they are found, and that nothing exceeds them."""
+"""Bounds of references in a formation: their derivation, and that nothing exceeds them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_no_heading_turns_a_formation_faster_than_proven(omega, turn, headings, 
 
 
 def test_a_zigzag_comes_near_what_is_proven():
-    """Turns one way and back when the response changes its sign: chi' then is at its bound."""
+    """Turn one way and back when the response changes its sign: then chi' reaches its bound."""
     heading, h, fastest = Heading(0.0, 0.0, 0.0, 0.0), 0.005, 0.0
     for k in range(10_000):
         t = k * h
@@ -67,7 +67,7 @@ def test_a_zigzag_comes_near_what_is_proven():
     st.tuples(*(st.floats(-3.0, 3.0),) * 6),
 )
 def test_reference_is_within_its_bounds(parameters, headings, moving):
-    """Whatever the heading does; velocity and acceleration of the leader need not fit together."""
+    """With any heading; velocity and acceleration of the leader need not fit together."""
     wide = (-1e9,) * 3, (1e9,) * 3
     parameters = parameters._replace(speed_max=1e9, turn_max=1e9, limits=wide)
     dy_0, ddy_0 = moving[:3], moving[3:]
@@ -97,7 +97,7 @@ def test_constant_age_is_stable_below_the_sum_of_both_times(lambda_, k_d, age):
 
 @given(st.floats(0.2, 2.0), st.floats(0.2, 2.0), st.floats(0.2, 6.0), st.floats(0.0, 3.0))
 @settings(max_examples=30)
-def test_stability_with_a_period_is_that_of_the_scheme(lambda_, k_d, period, delay):
+def test_stability_with_a_period_agrees_with_the_scheme(lambda_, k_d, period, delay):
     """Eigenvalues of the map over a period, found by steps of Euler's scheme from small errors."""
     n = 2000
     h, columns = period / n, []
@@ -132,7 +132,7 @@ BOUNDS = [formation_bounds.estimate_bounds(*link, h=H) for link in LINKS]
     st.randoms(use_true_random=False),
 )
 def test_no_leader_is_farther_from_its_estimate_than_proven(which, pushes, random):
-    """Leaders from rest, pushed to and fro as hard as they may be, and messages that get lost."""
+    """With leaders from rest, at any acceleration within the bound, and lost messages."""
     (estimator, messages, most), bound, h = LINKS[which], BOUNDS[which], H
     signs = [sign for sign, steps in pushes for _ in range(steps)]
     n = len(signs)
@@ -160,7 +160,7 @@ def test_bounds_are_infinite_where_the_proof_does_not_reach():
 
 
 def test_page_has_the_gains_and_the_bounds():
-    """formation.md: what its tables say of the filter, and of the estimate."""
+    """The tables on the filter and on the estimate in formation.md."""
     page = (Path(__file__).parents[2] / "docs/explanation/formation.md").read_text("utf-8")
     assert f"(1 + 10 exp(-3)) r = {RATE_GAIN:.3f} r" in page
     assert f"| {ACCELERATION_GAIN:.3f} omega r |" in page

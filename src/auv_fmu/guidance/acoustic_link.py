@@ -1,16 +1,16 @@
-"""What one vehicle tells another under water: messages with its position, late and sometimes lost.
+"""Messages under water with the position of a vehicle, late and sometimes lost.
 
-It is not in the paper. The sender's modem sends a message every `period`, from the start of the run
+Not in the paper. The sender's modem sends a message every `period`, from the start of the run
 on. A message sent at time t_k arrives after
 
     latency + |y(t_k) - y_receiver(t_k)| / sound_speed
 
 unless it is lost: by chance, in an outage, or because :data:`PLACES` others are under way. The
-sound's path is the straight line to where the receiver is when the message is sent: in the time
-that sound needs for 1.5 km, a vehicle of 1 m/s moves by 1 m, which changes the delay by 0.7 ms.
+sound travels along the straight line to the receiver's position at the time of sending: while it
+travels 1.5 km, a vehicle moves by 1 m at 1 m/s, which changes the delay by 0.7 ms.
 
-The receiver keeps the message that was sent last. One that is overtaken by a later one counts as
-received, and is not used.
+The receiver keeps the message that was sent last. A message that a later one overtakes counts as
+received, but is not used.
 """
 
 from __future__ import annotations
@@ -22,29 +22,29 @@ from auv_fmu.language.random_numbers import MESSAGE_LOSSES, start, uniform
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import Vector3, distance
 
-#: Shortest period [s]: no modem is so quick.
+#: Shortest period [s], which no modem reaches.
 _QUICKEST = 0.01
 
 #: Most messages that are under way at the same time.
 PLACES = 16
 
-#: Most messages in one step; more are taken for a mistake.
+#: Most messages in one step; more are regarded as a mistake.
 MOST_IN_A_STEP = 10_000
 
-#: What hosts may make of times by rounding, as a share of a step.
+#: Tolerance for rounded times, as a share of a step.
 _ROUNDING = 1e-6
 
-#: A place of the queue where no message is; the last number of one where there is one is 1.
+#: Numbers in a place of the queue, and an empty place. The last number of an occupied one is 1.
 _NUMBERS = 9
 _EMPTY = Vector((0.0,) * _NUMBERS)
 
 
 class BadLink(ArithmeticError):
-    """No link has such parameters, or a step is too long for it."""
+    """Parameters that no link can have, or a step that is too long."""
 
 
 class Parameters(NamedTuple):
-    """Of the link; the defaults are a quick modem that loses nothing."""
+    """Parameters of the link; the defaults are a quick modem that loses nothing."""
 
     period: Annotated[float, Variable("s", "Time between two messages", _QUICKEST)] = 1.0
     sound_speed: Annotated[float, Variable("m/s", "Speed of sound in water", POSITIVE)] = 1500.0
@@ -61,30 +61,30 @@ class Parameters(NamedTuple):
 
 
 class Message(NamedTuple):
-    """What the sender says of itself."""
+    """A message of the sender about itself."""
 
-    sent: float  #: when [s]
-    y: Vector3  #: its measured control point [m], earth frame
-    eta: Vector3  #: its attitude (phi, theta, psi) [rad]
+    sent: float  #: time of sending [s]
+    y: Vector3  #: measured control point [m], earth frame
+    eta: Vector3  #: attitude (phi, theta, psi) [rad]
 
 
 class LinkState(NamedTuple):
-    """What is under way, and what has arrived."""
+    """Messages under way, and the newest one that has arrived."""
 
     start: float  #: time at which the run began [s]
-    sent: int  #: how many messages have been sent
-    random: float  #: of the generator
-    queue: Annotated[Matrix, PLACES, _NUMBERS]  #: arrival, when sent, y, eta, whether it is one
-    newest: Message  #: of those that have arrived, the one that was sent last
-    received: int  #: how many have arrived
-    lost: int  #: how many never will
+    sent: int  #: number of messages sent
+    random: float  #: state of the generator
+    queue: Annotated[Matrix, PLACES, _NUMBERS]  #: arrival, sending, y, eta, 1
+    newest: Message  #: last sent one of the messages that have arrived
+    received: int  #: number of messages that have arrived
+    lost: int  #: number of messages that never will
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse modems that would always have more messages under way than there are places.
+    """Refuse a link with more messages under way than :data:`PLACES`.
 
     Raises:
-        BadLink: they would.
+        BadLink: the latency is too long for the period.
 
     """
     period, latency = parameters.period, parameters.latency
@@ -96,7 +96,7 @@ def check(parameters: Parameters) -> None:
 
 
 def first_state(parameters: Parameters, y: Vector3, eta: Vector3, t: float) -> LinkState:
-    """State at the start: vehicles tell each other where they are before they dive.
+    """State at the start, when the receiver knows the position of the sender.
 
     Args:
         parameters: of the link.
@@ -111,12 +111,12 @@ def first_state(parameters: Parameters, y: Vector3, eta: Vector3, t: float) -> L
 
 
 def delay(parameters: Parameters, y: Vector3, receiver: Vector3) -> float:
-    """How long a message is under way [s].
+    """Time that a message is under way [s].
 
     Args:
         parameters: of the link.
-        y: where it is sent [m].
-        receiver: where the receiver is then [m].
+        y: position of the sender [m].
+        receiver: position of the receiver at the time of sending [m].
 
     """
     return parameters.latency + distance(y, receiver) / parameters.sound_speed
@@ -131,10 +131,10 @@ def advance(
     t: float,
     h: float,
 ) -> LinkState:
-    """State after a step: all messages are sent and received whose time it is.
+    """State after a step, in which all messages that are due are sent and received.
 
-    A message whose time is the end of the step belongs to the next one, which knows the position
-    there.
+    A message that is due at the end of the step is sent in the next one, which has the position of
+    that time.
 
     Args:
         parameters: of the link.
@@ -166,21 +166,21 @@ def advance(
 
 
 def next_time(parameters: Parameters, state: LinkState) -> float:
-    """When the next message is sent [s]."""
+    """Time at which the next message is sent [s]."""
     return state.start + state.sent * parameters.period
 
 
 def sent(parameters: Parameters, state: LinkState, message: Message, delay: float) -> LinkState:
     """State after a message is sent.
 
-    Each message takes one random number, also one in an outage: so an outage leaves the fate of
-    the others as it was.
+    Each message takes one random number, also in an outage. So an outage does not change which of
+    the other messages are lost.
 
     Args:
         parameters: of the link.
         state: when it is sent.
         message: to be sent.
-        delay: how long it would be under way [s].
+        delay: time that it would be under way [s].
 
     """
     random, u = uniform(state.random)
@@ -194,7 +194,7 @@ def sent(parameters: Parameters, state: LinkState, message: Message, delay: floa
 
 
 def free_place(queue: Matrix) -> int:
-    """The first place of a queue without a message; the number of places: there is none."""
+    """First free place of a queue; :data:`PLACES` if there is none."""
     for k in range(PLACES):
         if queue[k, _NUMBERS - 1] == 0.0:
             return k
@@ -202,7 +202,7 @@ def free_place(queue: Matrix) -> int:
 
 
 def arrived(state: LinkState, t: float) -> LinkState:
-    """State after all messages have been received that arrive until a time.
+    """State after the arrival of all messages until a time.
 
     Args:
         state: before.

@@ -1,6 +1,6 @@
-"""The reference of one vehicle in a formation, from its leader's and its place beside it.
+"""The reference of one vehicle in a formation, from the leader's reference and the vehicle's place.
 
-It is not in the paper. The vehicle's place is an offset d from the leader's reference y_0, forward,
+Not in the paper. The vehicle's place is an offset d from the leader's reference y_0, forward,
 to starboard and down in a horizontal frame that is turned by chi:
 
     y_d = y_0 + R d
@@ -9,20 +9,20 @@ to starboard and down in a horizontal frame that is turned by chi:
 
 with R = R_z(chi), S d = (-d_y, d_x, 0) and d_h = (d_x, d_y, 0): exact derivatives.
 
-- A reference carries its heading psi_0, but not the derivatives of it, and that of a link comes in
-  jumps. So chi follows psi, which turns towards psi_0 at no more than `turn_chi`, through a filter
-  of third order, which has no error at a constant rate of turn:
+- A reference has a heading psi_0, but not its derivatives, and the heading from a link jumps. So
+  chi follows psi, which turns towards psi_0 at no more than `turn_chi`, through a filter of third
+  order, which has no error at a constant rate of turn:
 
       chi'' = -3 omega chi' + 3 omega^2 e + b,  b' = omega^3 e,  e = psi - chi
 
 - d changes from stage to stage by 10 a^3 - 15 a^4 + 6 a^5, a from 0 to 1 over the change: twice
   continuously differentiable, with at most 15/8 of the mean speed, and 10 / sqrt(3) |change| / T^2.
-- Where the leader's reference is not known, the observer (23), (51) of the paper estimates it from
-  the position that messages bring, which are `age` old:
+- If the leader's reference is not known, the observer (23), (51) of the paper estimates it from the
+  position in messages that are `age` old:
 
       z = y_0 + age dy_hat_o - y_hat
       dy_hat = dy_hat_o + Lambda s(z) + k_d z     (23)
-      ddy_hat_o = k_d Lambda s(z)                 (51), for an acceleration that is not known
+      ddy_hat_o = k_d Lambda s(z)                 (51), for an unknown acceleration
 
   Its y_hat, dy_hat and ddy_hat_o then stand for y_0, dy_0 and ddy_0.
 """
@@ -61,7 +61,7 @@ MOST = 4
 #: Most vehicles of a formation.
 _CROWD = 64
 
-#: Largest first and second derivative of a change, over its mean speed, and over that and its time.
+#: Largest first and second derivative of a change of unit length and duration.
 PEAK_SPEED = 1.875
 PEAK_ACCELERATION = 10.0 / sqrt(3.0)
 
@@ -82,10 +82,10 @@ class Shape(IntEnum):
     COLUMN = 1  #: astern, one after the other
     V = 2  #: as in a line, and as far astern as to the side
     CIRCLE = 3  #: around the leader's reference; place 1 is ahead, the next to starboard of it
-    TABLE = 4  #: wherever the offset says
+    TABLE = 4  #: at the offset
 
 
-#: Each by a name of its own, which Python finds faster than in the class.
+#: Module-level names, which Python looks up faster than members of the class.
 LINE, COLUMN, V, CIRCLE, TABLE = Shape
 
 
@@ -136,7 +136,7 @@ class Stages(NamedTuple):
 
 
 class Estimator(NamedTuple):
-    """Of the leader's reference, from messages; the defaults suit one every second or two."""
+    """Estimator of the leader's reference; the defaults suit a message every one or two seconds."""
 
     lambda_: Annotated[
         float,
@@ -174,7 +174,7 @@ class Parameters(NamedTuple):
         ),
     ] = False
     estimator: Annotated[Estimator, Variable(name="")] = Estimator()
-    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: that is to follow
+    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: follower
     ell: Distance = ELL
     limits: Annotated[Limits, Variable(name="")] = Limits()
     speed_max: Annotated[float, Variable("m/s", "Largest accepted speed", 0.0)] = 2.5
@@ -182,7 +182,7 @@ class Parameters(NamedTuple):
 
 
 class Known(NamedTuple):
-    """What is known of the leader's reference."""
+    """Information about the leader's reference."""
 
     y_0: Annotated[
         Vector3,
@@ -202,10 +202,10 @@ class Known(NamedTuple):
 class Heading(NamedTuple):
     """State of the filter of the heading."""
 
-    psi: float  #: that it follows: the path's, without fast turns [rad]
+    psi: float  #: input of the filter: heading of the path without fast turns [rad]
     chi: float  #: [rad]
     dchi: float  #: [rad/s]
-    b: float  #: of its integrator [rad/s2]
+    b: float  #: state of the integrator [rad/s2]
 
 
 class FormationState(NamedTuple):
@@ -213,7 +213,7 @@ class FormationState(NamedTuple):
 
     heading: Heading
     y_hat: Vector3  #: estimated control point of the leader [m]
-    dy_hat_o: Vector3  #: of (23) and (51) [m/s]
+    dy_hat_o: Vector3  #: state of (23) and (51) [m/s]
 
 
 class Place(NamedTuple):
@@ -290,22 +290,22 @@ def ddchi(omega: float, heading: Heading) -> float:
 
 
 def turned(omega: float, turn: float, heading: Heading, psi_0: float, h: float) -> Heading:
-    """State of the filter after h seconds, exact for what it follows.
+    """State of the filter after h seconds, solved exactly.
 
-    It follows a heading psi that turns at a constant rate over the step, towards that of the path.
-    With x = (e, chi' - psi', b / omega - 3 psi'), x' = (-omega + N) x, and N^3 = 0, as the filter
-    has a triple pole at -omega: exp((-omega + N) h) = exp(-omega h) (1 + N h + N^2 h^2 / 2).
+    Over the step psi turns at a constant rate towards the heading of the path. With x = (e, chi' -
+    psi', b / omega - 3 psi'), x' = (-omega + N) x, and N^3 = 0, as the filter has a triple pole at
+    -omega: exp((-omega + N) h) = exp(-omega h) (1 + N h + N^2 h^2 / 2).
 
     Args:
         omega: of the filter [rad/s].
-        turn: fastest turn that it follows [rad/s].
+        turn: fastest turn of psi [rad/s].
         heading: state of the filter at the beginning.
         psi_0: heading of the path [rad].
         h: step [s], not zero.
 
     """
     way = psi_0 - heading.psi
-    way = max(-turn * h, min(turn * h, atan2(sin(way), cos(way))))  # the short way round
+    way = max(-turn * h, min(turn * h, atan2(sin(way), cos(way))))  # the shorter way round
     dpsi = way / h
     e, rate, c = heading.psi - heading.chi, heading.dchi - dpsi, heading.b / omega - 3 * dpsi
     p = omega * e - rate  # N x
@@ -328,10 +328,10 @@ def turned(omega: float, turn: float, heading: Heading, psi_0: float, h: float) 
 
 
 def innovation(estimator: Estimator, state: FormationState, known: Known) -> Vector3:
-    """z [m]: what the last message says against the estimate; nothing if it is too old.
+    """z [m]: difference of the last message and the estimate; zero if the message is too old.
 
-    Each of its components is limited, and with them how much faster than the leader the reference
-    of a vehicle is that has lost it and finds it again.
+    Each component is limited, and so is the speed at which a vehicle that has lost its leader
+    catches up with it.
     """
     if known.age > estimator.age_max:
         return _NOWHERE
@@ -345,10 +345,10 @@ def innovation(estimator: Estimator, state: FormationState, known: Known) -> Vec
 
 
 def acceleration(estimator: Estimator, z: Vector3) -> Vector3:
-    """ddy_hat_o [m/s2]: (51); nothing in a direction in which z is at its limit.
+    """ddy_hat_o of (51) [m/s2]; zero in directions in which z is at its limit.
 
-    Otherwise the velocity that is estimated would grow all the time that the vehicle needs to find
-    its leader again, and take it past it.
+    Otherwise the estimated velocity would grow for as long as the vehicle catches up with its
+    leader, and carry it past the leader.
     """
     most, lambda_, k_d = estimator.z_max, estimator.lambda_, estimator.k_d
     a = observer.rate(observer.EULER, _NOWHERE, saturation(TANH, z), lambda_, k_d)
@@ -360,7 +360,7 @@ def acceleration(estimator: Estimator, z: Vector3) -> Vector3:
 
 
 def leader(parameters: Parameters, state: FormationState, known: Known) -> Reference:
-    """The leader's reference: as it is given, or as it is estimated."""
+    """The leader's reference, given or estimated."""
     if not parameters.estimated:
         return Reference(known.y_0, known.dy_0, known.ddy_0)
     estimator = parameters.estimator
@@ -383,7 +383,7 @@ def first_state(known: Known) -> FormationState:
 def step(parameters: Parameters, state: FormationState, known: Known, h: float) -> FormationState:
     """State after a step, with held inputs.
 
-    The filter of the heading is exact for them, the observer is Euler's scheme as in the paper.
+    The heading is solved exactly, the observer by Euler's scheme, as in the paper.
 
     Args:
         parameters: of the planner.
@@ -410,7 +410,7 @@ def reference(parameters: Parameters, state: FormationState, known: Known, t: fl
         t: time [s].
 
     Raises:
-        ImpossiblePath: the leader is known, and no vehicle can follow it in this place.
+        ImpossiblePath: the leader is known, and the vehicle cannot keep its place.
 
     """
     y_0, dy_0, ddy_0 = leader(parameters, state, known)
@@ -426,12 +426,12 @@ def reference(parameters: Parameters, state: FormationState, known: Known, t: fl
         add(ddy_0, ahead(chi, sub_scaled(faster, dchi * dchi, level))),
     )
     if not parameters.estimated:
-        hold(parameters, wanted)
+        check_reference(parameters, wanted)
     return wanted
 
 
 def across(d: Vector3) -> Vector3:
-    """S d: a vector turned to starboard by a right angle, without what is vertical of it."""
+    """S d: the horizontal part of a vector, turned to starboard by a right angle."""
     return -d[1], d[0], 0.0
 
 
@@ -442,12 +442,12 @@ def ahead(chi: float, d: Vector3) -> Vector3:
 
 
 def posture(parameters: Parameters, state: FormationState, wanted: Reference) -> Vector5:
-    """Posture of a vehicle that points along its reference; at rest, as the formation does.
+    """Posture of a vehicle that points along its reference; at rest, along the formation.
 
     Args:
         parameters: of the planner.
         state: of the planner.
-        wanted: its reference.
+        wanted: reference of the vehicle.
 
     """
     along = wanted.dy_d
@@ -456,22 +456,22 @@ def posture(parameters: Parameters, state: FormationState, wanted: Reference) ->
     return path_planner.posture(wanted.y_d, along, parameters.ell)
 
 
-# Whether it can be followed
+# Limits of the vehicle
 
 
-def hold(parameters: Parameters, wanted: Reference) -> None:
-    """Refuse a moment of the reference that the vehicle cannot follow.
+def check_reference(parameters: Parameters, wanted: Reference) -> None:
+    """Refuse a reference, at one time, that the vehicle cannot follow.
 
-    It can where it could with its bow in any direction; if not there, by a steady motion along the
-    path. The first is for formations that set off and begin to turn: places on the inner side then
-    move back, so their course turns round, at little speed, which no steady motion does.
+    The vehicle can follow it if it could with any heading, or else by a steady motion along the
+    path. The first criterion is for formations that start to move and turn: places on the inner
+    side then move back, so their course turns round at low speed, which no steady motion does.
 
     Raises:
         ImpossiblePath: a limit is exceeded.
 
     """
     if not is_easy(parameters, wanted):
-        path_planner.hold_moment(
+        path_planner.check_demand(
             path_planner.demand(parameters.vehicle, parameters.ell, wanted),
             parameters.limits,
             parameters.speed_max,
@@ -482,14 +482,14 @@ def hold(parameters: Parameters, wanted: Reference) -> None:
 
 
 def is_easy(parameters: Parameters, wanted: Reference) -> bool:
-    """Whether the vehicle can follow a moment of the reference wherever its bow points.
+    """True if the vehicle can follow a reference, at one time, with any heading.
 
     The surge force moves the control point along the bow, and the moments move it across, ell ahead
-    of the centre of mass. Sway and heave are left out.
+    of the centre of mass. Sway and heave are neglected.
 
     Args:
         parameters: of the planner.
-        wanted: its reference.
+        wanted: reference of the vehicle.
 
     """
     vehicle, ell, (least, most) = parameters.vehicle, parameters.ell, parameters.limits
@@ -507,10 +507,10 @@ def is_easy(parameters: Parameters, wanted: Reference) -> bool:
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse stages that no vehicle can change between.
+    """Refuse changes of stage that the vehicle cannot make.
 
     Raises:
-        ImpossibleFormation: a change is faster than the vehicle, or begins before another is over.
+        ImpossibleFormation: a change is too fast, or begins before the one before is over.
 
     """
     stages, vehicle = parameters.stages, parameters.vehicle

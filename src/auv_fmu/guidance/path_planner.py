@@ -1,13 +1,13 @@
 """A reference through waypoints: straight legs at constant velocity, rounded where they meet.
 
-It is not in the paper, which asks of a reference that y_d, dy_d and ddy_d are bounded (Assumption
-4), and that it is a motion of (1) and (2) (Definition 1). The first holds here, the second on
-straight legs only: what the vehicle cannot follow in a rounding is refused by :func:`check`.
+Not in the paper, which requires that y_d, dy_d and ddy_d are bounded (Assumption 4), and that the
+reference is a motion of (1) and (2) (Definition 1). The first holds here, the second on straight
+legs only: :func:`check` refuses a rounding that the vehicle cannot follow.
 
-A point that runs from waypoint to waypoint at constant velocities v_k jumps from one to the next at
-each corner. The reference is where this point is on the average, over the time T around the moment
-and weighted by a parabola. So a corner at waypoint p_k, passed at t_k, becomes a rounding of T: in
-it, with a = (t - t_k) / T + 1/2 from 0 to 1,
+The velocity of a point that runs from waypoint to waypoint at constant velocities v_k jumps at each
+corner. The reference is the mean position of this point over the time T around each instant,
+weighted by a parabola. So a corner at waypoint p_k, passed at t_k, becomes a rounding of the
+duration T: in it, with a = (t - t_k) / T + 1/2 from 0 to 1,
 
     y_d = p_k + v_k (t - t_k) + (v_k+1 - v_k) T (a^3 - a^4 / 2)
     dy_d = v_k + (v_k+1 - v_k) (3 a^2 - 2 a^3)
@@ -16,13 +16,13 @@ it, with a = (t - t_k) / T + 1/2 from 0 to 1,
 - y_d is twice continuously differentiable, and its derivatives are exact.
 - Legs that take longer than T are straight and at constant velocity between their roundings. A
   corner is cut by 3/32 |v_k+1 - v_k| T.
-- The reference never leaves the hull of the waypoints, and is nowhere faster than its fastest leg;
+- The reference stays in the convex hull of the waypoints, and is never faster than its fastest leg;
   |ddy_d| is at most 3/2 of the largest |v_k+1 - v_k| / T where roundings do not overlap.
 - Before the first corner and after the last one it rests: start and arrival are corners, too.
-- Roundings may overlap: where many waypoints lie close together, they are what smooths the curve.
+- Roundings may overlap, which smooths a curve of many close waypoints.
 
-A spline through the waypoints would meet them exactly, and swing out beside long legs, at a speed
-that was not chosen.
+A spline through the waypoints would meet them exactly, but swing out beside long legs, at other
+speeds.
 """
 
 from __future__ import annotations
@@ -45,23 +45,23 @@ from auv_fmu.paper.control_point import ELL, Distance
 from auv_fmu.paper.motion_planner import STEEPEST, Reference
 from auv_fmu.paper.vehicle import Vehicle
 
-#: Most waypoints of a path, as many as a Vector32 holds; and those that the default leaves over.
+#: Most waypoints of a path, as many as a Vector32 holds; and zeros for those that are not used.
 MOST = 32
 _UNUSED = (0.0,) * 26
 
-#: Moments of a rounding at which it is held against the limits, as a share of it: the middle of it,
-#: where a corner of equal speeds asks for most, is among them.
+#: Interval between the checks of a rounding, as a share of it. They include its middle, which is
+#: the most demanding instant of a corner between equal speeds.
 _BETWEEN = 1 / 32
 
 #: Square of the steepest slope.
 _STEEPEST_SLOPE = tan(STEEPEST) * tan(STEEPEST)
 
-#: What rounding may make of the steepness of two velocities, as a share of their product, and of
-#: their products with the fastest one.
+#: Rounding errors of the steepness of two velocities, relative to their product, and to their
+#: products with the fastest one.
 _OF_BOTH = 1e-9
 _OF_THE_FASTEST = 1e-12
 
-#: Where two moments differ by a smaller share of a rounding, they are one.
+#: Instants that differ by a smaller share of a rounding are the same.
 _SHORTEST = 1e-6
 
 _AT_REST: Vector3 = (0.0, 0.0, 0.0)
@@ -72,7 +72,7 @@ class ImpossiblePath(ArithmeticError):
 
 
 class Waypoints(NamedTuple):
-    """Points to pass, and when; the defaults are a small survey, near the vehicle of Fig. 4."""
+    """Waypoints and times; the defaults are a small survey near the vehicle of Fig. 4."""
 
     n: Annotated[
         int, Variable("1", "Number of waypoints; later ones are not used", 2, MOST, name="count")
@@ -124,32 +124,32 @@ class Parameters(NamedTuple):
     """All parameters of the planner."""
 
     waypoints: Annotated[Waypoints, Variable(name="")] = Waypoints()
-    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: that is to follow
+    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: follower
     ell: Distance = ELL
     limits: Annotated[Limits, Variable(name="")] = Limits()
-    #: With (2) and (3) a straight run ends at 2.67 m/s.
+    #: By (2) and (3) the vehicle reaches 2.67 m/s straight ahead.
     speed_max: Annotated[float, Variable("m/s", "Largest accepted speed", 0.0)] = 2.5
-    #: Where a turn on the spot ends.
+    #: By (2) and (3) the vehicle at rest reaches this rate of turn.
     turn_max: Annotated[float, Variable("rad/s", "Largest accepted turn rate", 0.0)] = 4.0
 
 
 class Corner(NamedTuple):
-    """A waypoint on the way."""
+    """A waypoint of the path."""
 
-    k: int  #: its number, from 0; n: after the last one
-    t: float  #: when it would be passed without roundings [s]
+    k: int  #: number, from 0; n: after the last one
+    t: float  #: time at which it would be passed without roundings [s]
 
 
 class PathState(NamedTuple):
-    """Where on the path the reference is."""
+    """Position of the reference on the path."""
 
     start: float  #: time at which the run began [s]
     t: float  #: time [s]
-    ahead: Corner  #: the first whose rounding is not over
+    ahead: Corner  #: first corner whose rounding is not over
 
 
 class Demand(NamedTuple):
-    """What a moment of the path asks of the vehicle."""
+    """Motion and forces that a path demands of the vehicle at an instant."""
 
     speed: float  #: [m/s]
     turn: float  #: rate at which the path turns [rad/s]
@@ -165,14 +165,14 @@ def waypoint(waypoints: Waypoints, k: int) -> Vector3:
 
 
 def duration(waypoints: Waypoints, k: int) -> float:
-    """How long the leg to waypoint k takes [s]."""
+    """Duration of the leg to waypoint k [s]."""
     if waypoints.timed:
         return waypoints.t[k] - waypoints.t[k - 1]
     return distance(waypoint(waypoints, k - 1), waypoint(waypoints, k)) / waypoints.cruise
 
 
 def velocity(waypoints: Waypoints, k: int) -> Vector3:
-    """v_k [m/s], of the leg to waypoint k: nothing before the first and after the last one."""
+    """v_k of the leg to waypoint k [m/s]: zero before the first and after the last waypoint."""
     if not 0 < k < waypoints.n:
         return _AT_REST
     T = duration(waypoints, k)
@@ -181,7 +181,7 @@ def velocity(waypoints: Waypoints, k: int) -> Vector3:
 
 
 def first_corner(waypoints: Waypoints, start: float) -> Corner:
-    """The start of the path: the whole of its rounding lies ahead, unless times say otherwise.
+    """First corner of the path; without times, its whole rounding lies ahead.
 
     Args:
         waypoints: of the path.
@@ -192,7 +192,7 @@ def first_corner(waypoints: Waypoints, start: float) -> Corner:
 
 
 def next_corner(waypoints: Waypoints, corner: Corner) -> Corner:
-    """The corner after one."""
+    """The next corner."""
     k = corner.k + 1
     if k >= waypoints.n:
         return Corner(waypoints.n, corner.t)
@@ -224,7 +224,7 @@ def advance(waypoints: Waypoints, state: PathState, t: float) -> PathState:
     Args:
         waypoints: of the path.
         state: at some time.
-        t: the other one; it may lie before, where a host goes back [s].
+        t: the other time; it may be earlier, since a host may go back [s].
 
     """
     corner = state.ahead if t >= state.t else first_corner(waypoints, state.start)
@@ -259,7 +259,7 @@ def reference(waypoints: Waypoints, corner: Corner, t: float) -> Reference:
 def course(waypoints: Waypoints, corner: Corner, dy_d: Vector3) -> Vector3:
     """A vector in the direction of the reference.
 
-    Where it rests, that is the direction of the last leg before; at the start, of the first one.
+    At rest, that is the direction of the last leg before; at the start, of the first leg.
 
     Args:
         waypoints: of the path.
@@ -291,23 +291,23 @@ def posture(y_d: Vector3, along: Vector3, ell: float) -> Vector5:
     return x, y, z, atan2(-dz, sqrt(dx * dx + dy * dy)), atan2(dy, dx)
 
 
-# What it asks of the vehicle
+# Demands on the vehicle
 
 
 def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
-    """What (2) asks of the actuators where the vehicle turns steadily with the path.
+    """Force and moments by (2) of a vehicle that turns steadily with the path.
 
     In a steady turn sway and heave are v = -m11 u r / d22 and w = m11 u q / d33, so the speed of
-    the control point (10) gives the surge u, and (2) the force and moments. The force that speeds
-    the vehicle up along the path is added to it.
+    the control point (10) gives the surge u, and (2) the force and moments. The force that
+    accelerates the vehicle along the path is added.
 
     Args:
-        vehicle: that follows.
-        ell: distance of its control point [m].
-        moment: of the reference, whose velocity is neither zero nor vertical.
+        vehicle: parameters.
+        ell: distance of the control point [m].
+        moment: reference at an instant, with a velocity that is neither zero nor vertical.
 
     Raises:
-        ImpossiblePath: the path turns within the length ell: no steady motion of the vehicle does.
+        ImpossiblePath: the path turns within the length ell, which no steady motion does.
 
     """
     m11, m22, m33 = vehicle.m11, vehicle.m22, vehicle.m33
@@ -316,7 +316,7 @@ def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
     faster = (dx * ddx + dy * ddy) / level
     q = (dz * faster - ddz * level) / (speed * speed)
     r = (dx * ddy - dy * ddx) / (level * speed)
-    # speed^2 = u^2 + (v + ell r)^2 + (w - ell q)^2, with the sway and heave that belong to u.
+    # speed^2 = u^2 + (v + ell r)^2 + (w - ell q)^2, with sway and heave as functions of u.
     sway, heave = m11 * r / vehicle.d22, m11 * q / vehicle.d33
     A = 1.0 + sway * sway + heave * heave
     B = ell * (sway * r + heave * q)
@@ -341,14 +341,14 @@ def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
     )
 
 
-# Whether it can be followed
+# Checks
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse a path that the vehicle cannot follow, and say where.
+    """Refuse a path that the vehicle cannot follow, with the place.
 
     Raises:
-        ImpossiblePath: waypoints make no path, or it asks for more than a limit.
+        ImpossiblePath: the waypoints make no path, or the path exceeds a limit.
 
     """
     waypoints, vehicle = parameters.waypoints, parameters.vehicle
@@ -372,7 +372,7 @@ def check(parameters: Parameters) -> None:
 
 
 def _check_leg(waypoints: Waypoints, k: int) -> None:
-    """Refuse a leg, to waypoint k, that nothing can go along."""
+    """Refuse an impossible leg to waypoint k."""
     before, behind = waypoint(waypoints, k - 1), waypoint(waypoints, k)
     x, y, z = sub(behind, before)
     if waypoints.timed and not waypoints.t[k] > waypoints.t[k - 1]:
@@ -394,9 +394,9 @@ def _check_leg(waypoints: Waypoints, k: int) -> None:
 
 
 def _check_pitch(waypoints: Waypoints) -> None:
-    """Refuse a path that is too steep in a rounding, between legs that are not.
+    """Refuse a path that is too steep in a rounding, although its legs are not.
 
-    From one moment at which a rounding begins or ends to the next, dy_d is one cubic polynomial.
+    From one instant at which a rounding begins or ends to the next, dy_d is a cubic polynomial.
     """
     opening, closing = first_corner(waypoints, 0.0), first_corner(waypoints, 0.0)
     begin, fastest, k = opening.t - waypoints.rounding / 2, 0.0, 1
@@ -419,13 +419,12 @@ def _check_pitch(waypoints: Waypoints) -> None:
 def _check_pitch_between(
     waypoints: Waypoints, ahead: Corner, begin: float, end: float, fastest: float
 ) -> None:
-    """Refuse what is too steep between two moments [s], of which dy_d is a cubic polynomial.
+    """Refuse a path that is too steep between two instants; dy_d is a cubic polynomial there.
 
     Args:
         waypoints: of the path.
-        ahead: the first corner whose rounding is not over at the beginning.
-        begin: one moment [s].
-        end: the other one [s].
+        ahead: first corner whose rounding is not over at the beginning.
+        begin, end: the instants [s].
         fastest: speed of the fastest leg [m/s].
 
     """
@@ -453,21 +452,20 @@ def _check_pitch_between(
                 )
             if share < _SHORTEST:
                 raise ImpossiblePath(
-                    f"the path turns back on the spot at waypoint {corner.k + 1:d}, which no "
+                    f"the path turns straight back at waypoint {corner.k + 1:d}, which no "
                     f"vehicle can follow; add a waypoint to one side"
                 )
 
 
 def _is_never_steep(early: Reference, late: Reference, duration: float, fastest: float) -> bool:
-    """Whether the path is nowhere too steep between two moments.
+    """True if the path is nowhere too steep between two instants.
 
-    Its steepness there is a polynomial of the sixth degree, and nowhere larger than the largest of
-    its coefficients in the basis of Bernstein.
+    Its steepness there is a polynomial of sixth degree, and nowhere larger than the largest of its
+    coefficients in the Bernstein basis.
 
     Args:
-        early: the path at one moment.
-        late: at the other one, between which dy_d is a cubic polynomial.
-        duration: from one to the other [s].
+        early, late: the path at both instants, between which dy_d is a cubic polynomial.
+        duration: time between them [s].
         fastest: speed of the fastest leg [m/s].
 
     """
@@ -485,13 +483,12 @@ def _is_never_steep(early: Reference, late: Reference, duration: float, fastest:
 
 
 def _steepness(one: Vector3, other: Vector3, fastest: float) -> float:
-    """A bilinear form: of a velocity and itself positive where it is steeper than STEEPEST.
+    """Bilinear form of velocities: steepness(v, v) > 0 where v is steeper than STEEPEST.
 
-    What rounding may make of it is taken off.
+    A bound of the rounding errors is subtracted.
 
     Args:
-        one: a velocity [m/s].
-        other: another one [m/s].
+        one, other: velocities [m/s].
         fastest: speed of the fastest leg [m/s].
 
     """
@@ -501,12 +498,12 @@ def _steepness(one: Vector3, other: Vector3, fastest: float) -> float:
 
 
 def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> None:
-    """Refuse a rounding that asks for too much, also at its ends, which are those of its legs.
+    """Refuse a rounding that demands too much; its ends stand for the legs.
 
     Args:
         parameters: of the planner.
-        corner: to be rounded.
-        ahead: the first whose rounding is not over at the beginning of this one.
+        corner: of the rounding.
+        ahead: first corner whose rounding is not over at the beginning of this one.
 
     """
     waypoints = parameters.waypoints
@@ -515,13 +512,13 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
         t = corner.t + waypoints.rounding * (i * _BETWEEN - 0.5)
         moment = reference(waypoints, corner_ahead(waypoints, ahead, t), t)
         dx, dy, dz = moment.dy_d
-        # The pitch has been checked: what is vertical here is what rounding has left of a rest.
+        # The pitch has been checked: a vertical velocity is a rounding error of zero.
         moves = dx * dx + dy * dy > 0.0
         if before[0] * dx + before[1] * dy + before[2] * dz < 0.0 or (
             not moves and norm(moment.ddy_d) > 0.0
         ):
             raise ImpossiblePath(
-                f"the path turns back on the spot at waypoint {corner.k + 1:d}, which no vehicle "
+                f"the path turns straight back at waypoint {corner.k + 1:d}, which no vehicle "
                 f"can follow; add a waypoint to one side"
             )
         if moves:
@@ -531,8 +528,8 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
 
 
 def _check_moment(parameters: Parameters, number: int, moment: Reference) -> None:
-    """Refuse a moment that asks for too much, near the waypoint of a number."""
-    hold_moment(
+    """Refuse an instant, near a waypoint, that demands too much."""
+    check_demand(
         demand(parameters.vehicle, parameters.ell, moment),
         parameters.limits,
         parameters.speed_max,
@@ -542,47 +539,47 @@ def _check_moment(parameters: Parameters, number: int, moment: Reference) -> Non
     )
 
 
-def hold_moment(
+def check_demand(
     asked: Demand, limits: Limits, speed_max: float, turn_max: float, number: int, y_d: Vector3
 ) -> None:
-    """Refuse a moment that asks for too much.
+    """Refuse a demand beyond the limits.
 
     Args:
-        asked: of the vehicle.
+        asked: demand on the vehicle.
         limits: of its actuators.
-        speed_max: that is let pass [m/s].
-        turn_max: that is let pass [rad/s].
-        number: of the waypoint near which that is, from 1; 0: there are none.
-        y_d: the control point [m].
+        speed_max: largest accepted speed [m/s].
+        turn_max: largest accepted turn rate [rad/s].
+        number: of the waypoint nearby, from 1; 0: there are no waypoints.
+        y_d: control point [m].
 
     Raises:
-        ImpossiblePath: it asks for more than a limit.
+        ImpossiblePath: the demand exceeds a limit.
 
     """
     speed, turn, (tau_u, tau_q, tau_r) = asked
     tau_min, tau_max = limits
-    hold_bounds("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
-    hold_bounds("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
-    hold_bounds("a surge force", tau_u, tau_min[0], tau_max[0], "N", number, y_d)
-    hold_bounds("a moment in pitch", tau_q, tau_min[1], tau_max[1], "N.m", number, y_d)
-    hold_bounds("a moment in yaw", tau_r, tau_min[2], tau_max[2], "N.m", number, y_d)
+    check_range("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
+    check_range("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
+    check_range("a surge force", tau_u, tau_min[0], tau_max[0], "N", number, y_d)
+    check_range("a moment in pitch", tau_q, tau_min[1], tau_max[1], "N.m", number, y_d)
+    check_range("a moment in yaw", tau_r, tau_min[2], tau_max[2], "N.m", number, y_d)
 
 
-def hold_bounds(
+def check_range(
     what: str, asked: float, least: float, most: float, unit: str, number: int, y_d: Vector3
 ) -> None:
-    """Refuse what is out of bounds.
+    """Refuse a value out of range.
 
     Args:
-        what: is asked for.
-        asked: how much of it.
-        least, most: its bounds.
-        unit: of these.
-        number: of the waypoint near which that is, from 1; 0: there are none.
-        y_d: the control point [m].
+        what: the quantity in words.
+        asked: its value.
+        least, most: its limits.
+        unit: of these numbers.
+        number: of the waypoint nearby, from 1; 0: there are no waypoints.
+        y_d: control point [m].
 
     Raises:
-        ImpossiblePath: it is.
+        ImpossiblePath: the value is out of range.
 
     """
     if not least <= asked <= most:

@@ -1,8 +1,7 @@
-"""Vectors and matrices of fixed size, with operators: for components of one's own.
+"""Vectors and matrices of fixed size, with operators, for users' components.
 
-The equations of the paper do without them: they have :mod:`.vectors`, for speed. Both classes are
-immutable, and their operators never change the order in which numbers are added up: a translation
-to C gives the same bits.
+The equations of the paper use :mod:`.vectors` instead, for speed. Both classes are immutable, and
+their operators add up numbers in a fixed order, so that a translation to C gives the same bits.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from typing import Any, overload
 
 
 class Vector(tuple[float, ...]):
-    """A vector with the operators of linear algebra instead of those of a tuple."""
+    """A tuple of numbers with the operators of linear algebra."""
 
     __slots__ = ()
 
@@ -58,7 +57,7 @@ class Vector(tuple[float, ...]):
         return _vector(found) if isinstance(place, slice) else found
 
     def sum(self) -> float:
-        """Return the sum, from the first element to the last; Python's has changed its rounding."""
+        """Return the sum, from first to last element, as Python did before version 3.12."""
         total = 0.0
         for x in self:
             total += x
@@ -67,7 +66,7 @@ class Vector(tuple[float, ...]):
     def replaced(self, place: int, value: float) -> Vector:
         """Return a copy with another element at a place."""
         elements = [*self]
-        self[place]  # its IndexError is the one of a tuple
+        self[place]  # raises IndexError
         elements[place] = float(value)
         return _vector(elements)
 
@@ -147,7 +146,7 @@ def _matrix(rows: Iterable[Vector]) -> Matrix:
 
 
 def _alike(one: Any, other: Any) -> Any:
-    """The other, if it is of the same type and length."""
+    """Return `other`, which must have the type and length of `one`."""
     if type(one) is not type(other) or len(one) != len(other):
         names = (f"a {type(x).__name__} of {len(x)}" for x in (one, other))
         raise TypeError(f"{' and '.join(names)} do not fit together")

@@ -1,4 +1,4 @@
-"""What is computed with vectors and matrices of any size, in the language of equations."""
+"""Functions of vectors and matrices of any size, in the language of equations."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from auv_fmu.language.arrays import Matrix, Vector
 
 
 def interpolate(x: float, xs: Vector, ys: Vector) -> float:
-    """The value at x of the line through points, as it is at its ends outside of them.
+    """Interpolate linearly between points; outside of them, the value at the end holds.
 
     Args:
-        x: where.
-        xs: of the points, each larger than the one before.
-        ys: of the points.
+        x: argument.
+        xs: arguments of the points, increasing.
+        ys: values of the points.
 
     """
     if x <= xs[0]:
@@ -24,7 +24,7 @@ def interpolate(x: float, xs: Vector, ys: Vector) -> float:
 
 
 def solve(A: Matrix, b: Vector) -> Vector:
-    """The solution x of A x = b, by elimination with the largest pivots.
+    """Solution x of A x = b, by Gaussian elimination with partial pivoting.
 
     Raises:
         ZeroDivisionError: A is singular.

@@ -1,4 +1,4 @@
-"""The quantities that pass through groups of ports: their members and the members' units.
+"""Quantities of groups of ports: their members and units.
 
 A member that is a name is written `group.member`, one that is a number `group[member]`.
 """
@@ -10,7 +10,7 @@ from typing import Union
 
 Members = Mapping[Union[str, int], str]
 
-#: Of a point, in the earth frame.
+#: Motion of a point in the earth frame.
 POSITION: Members = {"x": "m", "y": "m", "z": "m"}
 VELOCITY: Members = dict.fromkeys(POSITION, "m/s")
 ACCELERATION: Members = dict.fromkeys(POSITION, "m/s2")
@@ -22,15 +22,15 @@ EULER: Members = {"phi": "rad", "theta": "rad", "psi": "rad"}
 ETA: Members = {**POSITION, **EULER}
 ETA_WITHOUT_ROLL: Members = {member: unit for member, unit in ETA.items() if member != "phi"}
 
-#: Velocity of the vehicle, and what acts on it, in the body frame.
+#: Velocity of the vehicle, and forces on it, in the body frame.
 NU: Members = {"u": "m/s", "v": "m/s", "w": "m/s", "p": "rad/s", "q": "rad/s", "r": "rad/s"}
 NU_WITHOUT_ROLL: Members = {member: unit for member, unit in NU.items() if member != "p"}
 TAU_W: Members = {"u": "N", "v": "N", "w": "N", "p": "N.m", "q": "N.m", "r": "N.m"}
 
-#: What the actuators can do: no sway, heave or roll.
+#: Force and moments of the actuators: no sway, heave or roll.
 TAU: Members = {member: TAU_W[member] for member in ("u", "q", "r")}
 
-#: Of each of them.
+#: Time constants of the actuators.
 LAG: Members = dict.fromkeys(TAU, "s")
 
 #: Coefficients of (1, |dy_r|, |dy_r|^2, |ddy_r|) in the bound of a force.
@@ -43,15 +43,15 @@ def member_name(group: str, member: str | int) -> str:
 
 
 def group_name(name: str) -> str:
-    """The group that a structured name belongs to."""
+    """Group of a structured name."""
     return name.split(".", maxsplit=1)[0].split("[", maxsplit=1)[0]
 
 
 def member_of(name: str) -> str:
-    """The member that a structured name stands for, within its group; a scalar is its own."""
+    """Member of a structured name within its group; the name itself for a scalar."""
     return name[len(group_name(name)) + 1 :].removesuffix("]") or name
 
 
 def per_axis(unit: str) -> Members:
-    """The diagonal of a gain matrix, one entry an axis of the control point."""
+    """Members of the diagonal of a gain matrix, one for each axis of the control point."""
     return dict.fromkeys((1, 2, 3), unit)

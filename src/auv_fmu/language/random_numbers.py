@@ -11,7 +11,7 @@ The state of a generator is a whole number from 1 to m - 1, to be kept in the st
     state, u = uniform(state)
     state, n = gaussian(state)
 
-It is no generator for secrets, and it repeats after 2^31 - 2 numbers. All sequences are parts of
+It is not a generator for secrets, and repeats after 2^31 - 2 numbers. All sequences are parts of
 this one cycle: a seed and a stream only choose where one begins.
 """
 
@@ -25,15 +25,15 @@ MODULUS = 2147483647.0
 #: a, a primitive root of m.
 MULTIPLIER = 48271.0
 
-#: Streams of all that draws numbers. Phases of waves and losses of messages share one: a sea and a
-#: link with the same seed draw the same numbers, so give them different seeds.
+#: Streams. Phases of waves and losses of messages share one: a sea and a link with the same seed
+#: draw the same numbers, so give them different seeds.
 WAVE_FREQUENCIES = 0
 WAVE_PHASES = 1
 WAVE_DIRECTIONS = 2
 CURRENT_VARIATION = 3
 MESSAGE_LOSSES = 1
 
-#: What splits a seed, and a state, into two halves.
+#: Splits a seed or a state into two halves.
 _HALF = 65536.0
 
 #: Makes every 32-bit integer positive.
@@ -41,7 +41,7 @@ _SHIFT = 2147483648.0
 
 
 def after(state: float) -> float:
-    """The state after another one.
+    """Next state of the generator.
 
     Args:
         state: a whole number from 1 to m - 1.
@@ -51,10 +51,10 @@ def after(state: float) -> float:
 
 
 def mixed(state: float) -> float:
-    """A state that is no linear function of another one.
+    """A state that is a non-linear function of another one.
 
-    The generator multiplies: from states that differ little, or by a small factor, come sequences
-    that belong together. A product of a state and its own lower half does not.
+    The generator only multiplies, so states that differ little, or by a small factor, give
+    correlated sequences. The product of a state and its own lower half avoids this.
 
     Args:
         state: a whole number from 1 to m - 1.
@@ -68,13 +68,12 @@ def mixed(state: float) -> float:
 
 
 def start(seed: int, stream: int) -> float:
-    """The state of a generator at its start.
+    """State of a generator at its start.
 
     Args:
-        seed: any 32-bit integer. Of two that differ, the sequences are one with a probability of
-            4e-9: there are more seeds than states. In stream 0, those of 6400 and 23455 are.
-        stream: from 0 to 32767; another one begins elsewhere, so that one seed does for several
-            purposes.
+        seed: any 32-bit integer. Two seeds give the same sequence with a probability of 4e-9,
+            because there are more seeds than states; in stream 0, 6400 and 23455 do.
+        stream: from 0 to 32767; streams of one seed begin at different states.
 
     """
     number = seed + _SHIFT
@@ -86,7 +85,7 @@ def start(seed: int, stream: int) -> float:
 
 
 def uniform(state: float) -> tuple[float, float]:
-    """The state after another one, and a number between 0 and 1, never 0 or 1.
+    """Next state, and a number between 0 and 1, never 0 or 1.
 
     Args:
         state: a whole number from 1 to m - 1.
@@ -100,17 +99,16 @@ def normal(u: float, v: float) -> float:
     """A standard normal number from two that are uniform, after Box and Muller (1958).
 
     Args:
-        u: decides the angle; between 0 and 1.
-        v: decides the radius; between 0 and 1. Of two numbers of one generator it is the later one:
-            the successor of a small number is a times it, and would always give the largest radii
-            the same angles.
+        u: determines the angle; between 0 and 1.
+        v: determines the radius; between 0 and 1. Take the later one of two successive numbers: the
+            successor of a small number is a times it, so the largest radii would have equal angles.
 
     """
     return sqrt(-2.0 * log(v)) * cos(tau * u)
 
 
 def gaussian(state: float) -> tuple[float, float]:
-    """The state after two numbers, and a standard normal number made of them.
+    """State after two numbers, and a standard normal number made of them.
 
     Args:
         state: a whole number from 1 to m - 1.

@@ -1,11 +1,11 @@
-"""What a field of a class says of the variables that it is in an FMU."""
+"""Declaration of the variables of an FMU at the fields of a class."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-#: Smallest value of what must be positive. FMI knows only inclusive bounds.
+#: Smallest positive value, because FMI has only inclusive bounds.
 POSITIVE = 1e-9
 
 
@@ -15,7 +15,7 @@ class Refusal(Exception):
 
 @dataclass(frozen=True)
 class Variable:
-    """A variable of FMI, or several, noted at a field that has their type and start value.
+    """One or more variables of an FMU, declared at a field with their type and start value.
 
         K: Annotated[float, Variable("N", "Gain", minimum=0.0)] = 10.0
         y: Annotated[Vector3, Variable({"x": "m", "y": "m", "z": "m"}, "Position")]
@@ -23,20 +23,18 @@ class Variable:
     gives the variables `K`, `y.x`, `y.y` and `y.z`.
 
     Attributes:
-        unit: of a float, as :mod:`fmus.ports.units` reads it; "1" for none, "" if it is not known;
-            or the members of a vector or a tuple, with the unit of each.
+        unit: unit of a float, in the form of :mod:`fmus.ports.units`; "1" for none, "" if it is not
+            known; or the members of a vector or a tuple, with their units.
         description: one line.
         minimum, maximum: inclusive bounds of an input or a parameter.
-        tunable: whether a parameter may change during a run.
-        members: of a vector or a tuple: names or numbers of its elements; without them these are
-            counted from 1.
-        feedthrough: of an output: the inputs, by their fields or ports, that it depends on without
-            a state between, or `time`; in it `{}` stands for the member; None: all that the hook
-            `outputs` takes.
-        initially: of an output: the inputs that it depends on at the start besides; None: all, if
-            the hook `start` takes them.
-        name: other than that of the field; in it `{}` stands for the member. Of a field that is a
-            NamedTuple: what the names of its fields begin with, "" for nothing.
+        tunable: True if a parameter may change during a run.
+        members: names or numbers of the elements of a vector or a tuple; by default 1, 2 ...
+        feedthrough: for an output: inputs (fields or ports) or `time` that it directly depends on;
+            `{}` stands for the member; None: everything that the hook `outputs` takes.
+        initially: for an output: further inputs that it depends on at the start; None: all, if the
+            hook `start` takes them.
+        name: name of the port, if it is not the field's; `{}` stands for the member. For a field
+            that is a NamedTuple: prefix of the names of its fields, "" for none.
 
     """
 
@@ -51,5 +49,5 @@ class Variable:
     name: str | None = None
 
     def __hash__(self) -> int:
-        """Units by members have none."""
+        """Hash of the parts that are hashable."""
         return hash((self.description, self.name))

@@ -1,10 +1,10 @@
-"""Names for the tuples that the equations pass around, and the algebra of three-vectors.
+"""Types of the tuples in the equations, and the algebra of three-vectors.
 
-The equations here use it, because Python runs it several times as fast as the operators of
-:class:`.arrays.Vector`; those are for components of one's own and longer vectors.
+Python runs these functions several times as fast as the operators of :class:`.arrays.Vector`, which
+are for users' components and longer vectors.
 
-A function that gives a vector is named by a verb: `add` a + b, `sub` a - b, `scale` k a. `_scaled`
-means by k b, `_diag` by D b: D is a diagonal matrix of gains, given as its diagonal.
+Functions that return a vector have names such as `add` for a + b, `sub` for a - b, and `scale` for
+k a. `_scaled` means k b instead of b, `_diag` D b, with a diagonal matrix D given as its diagonal.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Fig. 2 of the paper, as tests and benchmarks need it.
+"""Fig. 2 of the paper, for tests and benchmarks.
 
 ===================  ===========================================
-module               what it states
+module               contents
 ===================  ===========================================
-:mod:`.closed_loop`  the line in Python, from instant to instant
+:mod:`.closed_loop`  the loop as straight-line Python
 ===================  ===========================================
 """

@@ -1,7 +1,7 @@
-"""The paper's Fig. 2 as one straight line of Python: no FMI, no master, no ports.
+"""The paper's Fig. 2 as straight-line Python: no FMI, no master, no ports.
 
-Loops of FMUs and compiled programs are held against it. In it stand the vehicle, the proposed
-controller or the PD controller it is compared with, the disturbance and the planner of the paper.
+Tests compare loops of FMUs and compiled programs with it. It consists of the vehicle, the proposed
+controller or the PD controller, the disturbance and the planner of the paper.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class LongestSteps(NamedTuple):
 class Setting(NamedTuple):
     """Parameters of every block of Fig. 2, with the values of section 4.1: the run of Fig. 4.
 
-    Each block has its own, the distance ell and the vehicle too, as the components have.
+    As in the components, each block has its own parameters, such as the distance ell.
     """
 
     plant: plant.Parameters = plant.Parameters()
@@ -49,7 +49,7 @@ PAPER = Setting()
 
 
 class Splits(NamedTuple):
-    """How many internal steps each component makes of a step."""
+    """Number of internal steps of each component in a step."""
 
     plant: int
     controller: int
@@ -57,7 +57,7 @@ class Splits(NamedTuple):
 
 
 class Vehicles(NamedTuple):
-    """The vehicle and the reference: their states, and what follows from these."""
+    """The vehicle and the reference: their states, attitude and accelerations."""
 
     plant: PlantState
     rotation: Rotation  #: body to earth
@@ -66,7 +66,7 @@ class Vehicles(NamedTuple):
 
 
 class Scene(NamedTuple):
-    """What vehicle and reference show at one instant."""
+    """Outputs of vehicle, reference and disturbance at one instant."""
 
     plant: PlantOutputs
     y: Vector3  #: measured control point [m]
@@ -75,20 +75,20 @@ class Scene(NamedTuple):
 
 
 class Sent(NamedTuple):
-    """What blocks pass on to others, whom it reaches one step late in Jacobi order."""
+    """Values that arrive at other blocks one step late in Jacobi order."""
 
     tau: Vector3  #: command (tau_u, tau_q, tau_r) [N, N.m]
     nu_r: Vector6  #: velocity of the vehicle through the water [m/s, rad/s]
 
 
 class Moment(NamedTuple):
-    """All that the rest of a run depends on, at one time t_k."""
+    """State of the loop at one time t_k, which determines the rest of a run."""
 
     t: float  #: [s]
     vehicles: Vehicles
     scene: Scene
     controller_state: Any
-    before: Sent  #: in the step that ends there
+    before: Sent  #: values of the step that ends there
 
 
 class Instant(NamedTuple):
@@ -97,11 +97,11 @@ class Instant(NamedTuple):
     t: float  #: [s]
     vehicles: Vehicles
     scene: Scene
-    measured: Measurement | PdMeasurement  #: what the controller is told
-    controller_state: Any  #: a ControllerState; of the PD controller theta_hat
+    measured: Measurement | PdMeasurement  #: inputs of the controller
+    controller_state: Any  #: a ControllerState, or theta_hat of the PD controller
     signals: Any  #: Signals or PdSignals
     command: Vector3  #: (tau_u, tau_q, tau_r) that reaches the actuators [N, N.m]
-    tau: Vector3  #: what the limits of (3) leave of it [N, N.m]
+    tau: Vector3  #: command after the limits of (3) [N, N.m]
     tau_w: Vector6  #: disturbance that acts (u, v, w, p, q, r) [N, N.m]
 
 
@@ -109,7 +109,7 @@ class Instant(NamedTuple):
 
 
 def measurement(gains: Gains | PdGains, seen: Scene) -> Measurement | PdMeasurement:
-    """What the controller is told; only the PD controller is told the velocity."""
+    """Inputs of the controller; only the PD controller gets the velocity."""
     if isinstance(gains, PdGains):
         return PdMeasurement(seen.y, seen.plant.euler, *seen.reference, seen.plant.dy)
     return Measurement(seen.y, seen.plant.euler, *seen.reference)
@@ -123,12 +123,12 @@ def first_state(gains: Gains | PdGains, y: Vector3) -> Any:
 
 
 def gated(gains: Gains | PdGains, state: Any, y: Vector3) -> Any:
-    """What the controller goes on from at an instant; the PD controller has no gate."""
+    """State of the controller after the gate, which the PD controller does not have."""
     return state if isinstance(gains, PdGains) else output_feedback.gated(gains, state, y)
 
 
 def evaluate(gains: Gains | PdGains, state: Any, measured: Any, h: float) -> Any:
-    """All that the controller computes from its state and what it is told."""
+    """Signals of the controller."""
     if isinstance(gains, PdGains):
         return pd.evaluate(gains, state, measured)
     return output_feedback.evaluate(gains, state, measured, h)
@@ -145,7 +145,7 @@ def advanced(gains: Gains | PdGains, state: Any, signals: Any, h: float) -> Any:
 
 
 def splits(setting: Setting) -> Splits:
-    """How a step is split."""
+    """Number of internal steps of each component."""
     return Splits(*(internal_steps(setting.h, longest_step(one)) for one in setting.h_max))
 
 
@@ -159,7 +159,7 @@ def vehicles_at_start(setting: Setting) -> Vehicles:
 
 
 def scene(setting: Setting, vehicles: Vehicles, t: float, n: Vector3) -> Scene:
-    """What is seen at time t [s].
+    """Outputs at time t [s].
 
     Args:
         setting: of the loop.
@@ -198,9 +198,9 @@ def act(setting: Setting, moment: Moment, parts: Splits, delayed: bool) -> Insta
     Args:
         setting: of the loop.
         moment: of the loop.
-        parts: that a step is split into.
-        delayed: the command, and what the disturbance is told, arrive one step late, as in Jacobi
-            order (reading 5).
+        parts: numbers of internal steps.
+        delayed: if set, the command and the input of the disturbance arrive one step late, as in
+            Jacobi order (reading 5).
 
     """
     t, seen, gains = moment.t, moment.scene, setting.controller
@@ -223,9 +223,9 @@ def move(
     Args:
         setting: of the loop.
         vehicles: at the beginning of the step.
-        tau: (tau_u, tau_q, tau_r) that the limits of (3) leave [N, N.m].
+        tau: command after the limits of (3) (tau_u, tau_q, tau_r) [N, N.m].
         tau_w: disturbance that acts (u, v, w, p, q, r) [N, N.m].
-        parts: that the step is split into.
+        parts: numbers of internal steps.
 
     """
     own, of_planner = setting.plant, setting.planner
@@ -243,14 +243,14 @@ def move(
 
 
 def step(setting: Setting, instant: Instant, parts: Splits, end: float, n: Vector3) -> Moment:
-    """All states advance together (reading 5).
+    """Advance all states together (reading 5).
 
     Args:
         setting: of the loop.
-        instant: that the step begins with.
-        parts: that it is split into.
+        instant: at the beginning of the step.
+        parts: numbers of internal steps.
         end: time at its end [s].
-        n: three independent standard normal numbers, for what is measured then.
+        n: three independent standard normal numbers, for the measurement then.
 
     """
     gains, h_c = setting.controller, setting.h / parts.controller

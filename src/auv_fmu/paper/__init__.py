@@ -1,7 +1,7 @@
 """The equations of the paper: the vehicle, its reference, and the two controllers.
 
 =======================  ==============================================================
-module                   what it states
+module                   contents
 =======================  ==============================================================
 :mod:`.vehicle`          (1), (2): kinematics and dynamics with five degrees of freedom
 :mod:`.actuators`        (3): limits of the actuators
@@ -18,5 +18,5 @@ module                   what it states
 :mod:`.euler`            section 4.1: Euler approximation and its time step
 =======================  ==============================================================
 
-What is added to the paper's equations is off by default, and says so where it stands.
+Additions to the paper's equations are off by default and marked "not in the paper".
 """

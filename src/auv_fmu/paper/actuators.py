@@ -1,4 +1,4 @@
-"""The limits of the actuators, equation (3), and the dynamics that Remark 2 leaves out."""
+"""The limits of the actuators, equation (3), and the dynamics that Remark 2 neglects."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Limits(NamedTuple):
 
 
 def limit(tau_k: float, tau_min: float, tau_max: float) -> float:
-    """One actuator that cannot leave its limits: equation (3).
+    """Equation (3): the limits of one actuator.
 
     Args:
         tau_k: commanded force [N] or moment [N.m].
@@ -50,21 +50,21 @@ def limit_all(tau: Vector3, tau_min: Vector3, tau_max: Vector3) -> Vector3:
 
 
 class Drive(NamedTuple):
-    """What the actuators u, q, r give within a step [N, N.m]."""
+    """Force and moments (u, q, r) of the actuators within a step [N, N.m]."""
 
     first: Vector3  #: at its beginning
     middle: Vector3  #: halfway, as Simpson's rule needs it for the mean
     last: Vector3  #: at its end
-    mean: Vector3  #: over it
+    mean: Vector3  #: over the step
 
 
 def respond(before: float, tau_k: float, T: float, h: float) -> float:
-    """One actuator of first order, T dtau_a/dt = tau_k - tau_a, after a step: exactly.
+    """Output of an actuator of first order after a step: T dtau_a/dt = tau_k - tau_a, exactly.
 
     Args:
-        before: what it gave at the beginning of the step [N, N.m].
-        tau_k: what it is to give, held during the step, within the limits of (3).
-        T: its time constant [s]; 0: it follows at once.
+        before: output at the beginning of the step [N, N.m].
+        tau_k: command within the limits of (3), held during the step.
+        T: time constant [s]; 0: no lag.
         h: step [s].
 
     """
@@ -72,7 +72,7 @@ def respond(before: float, tau_k: float, T: float, h: float) -> float:
 
 
 def mean_response(before: float, tau_k: float, T: float, h: float) -> float:
-    """The mean of the same actuator over the step: its impulse divided by h, exactly."""
+    """Mean output of the same actuator over the step: its impulse divided by h, exactly."""
     if not T:
         return tau_k
     x = h / T
@@ -80,12 +80,12 @@ def mean_response(before: float, tau_k: float, T: float, h: float) -> float:
 
 
 def given(before: Vector3, tau: Vector3, T: Vector3) -> Vector3:
-    """What the actuators u, q, r give: those that follow at once what they are to give.
+    """Outputs of the actuators u, q, r when the command changes: without a lag, the command.
 
     Args:
-        before: what they gave just before [N, N.m].
-        tau: what they are to give [N, N.m].
-        T: their time constants [s]; 0: they follow at once.
+        before: outputs just before [N, N.m].
+        tau: commands [N, N.m].
+        T: time constants [s]; 0: no lag.
 
     """
     return (
@@ -96,15 +96,15 @@ def given(before: Vector3, tau: Vector3, T: Vector3) -> Vector3:
 
 
 def drive(before: Vector3, tau: Vector3, T: Vector3, h: float) -> Drive:
-    """What the actuators u, q, r give within a step.
+    """Outputs of the actuators u, q, r within a step.
 
-    A vehicle that takes the mean feels the true impulse, and so does one whose scheme weighs
-    first, middle and last by 1, 4, 1: the middle is off by O(h^4), and right for any T.
+    The mean gives the exact impulse, and so does a scheme that weights first, middle and last by 1,
+    4, 1: `middle` is chosen for this, and differs from the true value by O(h^4) for any T.
 
     Args:
-        before: what they gave at its beginning [N, N.m].
-        tau: what they are to give, held during the step, within the limits of (3) [N, N.m].
-        T: their time constants [s]; 0: they follow at once.
+        before: outputs at the beginning of the step [N, N.m].
+        tau: commands within the limits of (3), held during the step [N, N.m].
+        T: time constants [s]; 0: no lag.
         h: step [s].
 
     """

@@ -24,7 +24,7 @@ Layer = Annotated[
     ),
 ]
 
-#: What it estimates [N, kg/s, kg/m, kg].
+#: Estimate of the adaptive law [N, kg/s, kg/m, kg].
 Estimate = Annotated[
     Vector4, Variable(THETA, "Estimated parameters of the bounding function (theta_hat)")
 ]

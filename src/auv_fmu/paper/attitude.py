@@ -63,7 +63,7 @@ def rotate_back(rotation: Rotation, x: Vector3) -> Vector3:
 
 
 def quaternion_from_euler(phi: float, theta: float, psi: float) -> Vector4:
-    """Unit quaternion (scalar first) of the same rotation as :func:`rotation_from_euler`."""
+    """Unit quaternion (scalar first) of the rotation of :func:`rotation_from_euler`."""
     c_phi, s_phi = cos(phi / 2), sin(phi / 2)
     c_theta, s_theta = cos(theta / 2), sin(theta / 2)
     c_psi, s_psi = cos(psi / 2), sin(psi / 2)
@@ -88,17 +88,17 @@ def rotation_from_quaternion(quaternion: Vector4) -> Rotation:
 def euler_from_rotation(rotation: Rotation) -> Vector3:
     """Roll, pitch and yaw [rad] of a rotation, pitch within +-pi/2.
 
-    When the vehicle is vertical, roll and yaw are not unique; their combination still is, so
-    :func:`rotation_from_euler` gives the rotation back.
+    If the vehicle is vertical, roll and yaw are not unique, but together they are: from them
+    :func:`rotation_from_euler` restores the rotation.
     """
     (r11, r21, r31), (_, _, r32), (_, _, r33) = rotation
-    # A product of rounded quaternion components can leave [-1, 1] by one unit in the last place.
+    # Rounding can take this product of quaternion components out of [-1, 1] by one ulp.
     sin_theta = -1.0 if r31 > 1.0 else 1.0 if r31 < -1.0 else -r31
     return atan2(r32, r33), asin(sin_theta), atan2(r21, r11)
 
 
 def euler_without_roll(rotation: Rotation) -> Vector3:
-    """Roll, pitch and yaw [rad] of a rotation whose roll is zero: beyond the vertical, too."""
+    """Roll, pitch and yaw [rad] of a rotation without roll, also beyond the vertical."""
     (_, _, r31), (r12, r22, _), (_, _, r33) = rotation
     return 0.0, atan2(-r31, r33), atan2(-r12, r22)
 
@@ -116,10 +116,10 @@ def quaternion_rates(quaternion: Vector4, omega: Vector3) -> Vector4:
 
 
 def normalised(quaternion: Vector4) -> Vector4:
-    """The unit quaternion of the same direction.
+    """Unit quaternion of the same direction.
 
     Raises:
-        ZeroDivisionError: it has none, being zero.
+        ZeroDivisionError: the quaternion is zero.
 
     """
     a, b, c, d = quaternion

@@ -25,12 +25,12 @@ class Disturbance(NamedTuple):
 
 
 def sign(x: float) -> float:
-    """-1, 0 or 1; sign(0) = 0 (reading 8)."""
+    """Sign of x: -1, 0 or 1, with sign(0) = 0 (reading 8)."""
     return copysign(1.0, x) if x else 0.0
 
 
 def disturbance(parameters: Disturbance, nu: Vector6, t: float) -> Vector6:
-    """tau_w(t), the same form in every degree of freedom: equation (56).
+    """Equation (56), tau_w(t): the same form in every degree of freedom.
 
     `sign(k)` in (56) is the sign of the velocity in direction k (reading 8).
 

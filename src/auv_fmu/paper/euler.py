@@ -1,4 +1,4 @@
-"""The Euler approximation that section 4.1 simulates with.
+"""The Euler approximation of section 4.1.
 
 Everything is evaluated at t_k, then all states advance together (reading 5): the `step` of every
 module takes each state x to x + h dx/dt.
@@ -13,20 +13,20 @@ from auv_fmu.language.vectors import Vector4
 #: The time step h of section 4.1 [s].
 STEP = 0.02
 
-#: A step may exceed the largest internal one, and its end the stop time, by this share: hosts round
-#: time.
+#: Share by which a step may exceed the largest internal one, and its end the stop time, because
+#: hosts round times.
 ROUNDING = 1e-9
 
-#: Largest norm of a state. No vehicle comes near it, and from a state below it a step with sane
-#: inputs is always finite: one wild sample must not be the end of a run.
+#: Largest norm of a state, far beyond any vehicle's. From a state below it a step with sane
+#: inputs is always finite, so one wild sample does not end a run.
 LARGEST_STATE = 1e100
 
-#: More internal steps than this in one step are taken for a mistake: in Python they take seconds.
+#: Largest number of internal steps; more would be a mistake, and take seconds in Python.
 MOST_INTERNAL_STEPS = 100_000
 
 
 def longest_step(h_max: float) -> float:
-    """The longest step that is not split [s].
+    """Longest step that is not split [s].
 
     Args:
         h_max: largest internal step [s].
@@ -36,29 +36,29 @@ def longest_step(h_max: float) -> float:
 
 
 def latest_end(start: float, stop: float) -> float:
-    """The latest end of a step: hosts that add their steps up reach a stop time nearly [s].
+    """Latest end of a step [s]: hosts that add up their steps may pass the stop time slightly.
 
     Args:
         start: of the run [s].
-        stop: of the run; infinite: none [s].
+        stop: of the run [s]; infinite: none.
 
     """
     return stop + ROUNDING * max(abs(start), abs(stop))
 
 
 def internal_steps(h: float, longest: float) -> int:
-    """How many equal internal steps a step is split into.
+    """Number of equal internal steps of a step.
 
     Args:
         h: step, not negative [s].
-        longest: that is not split [s].
+        longest: longest step that is not split [s].
 
     """
     return ceil(h / longest)
 
 
 def end_of_step(start: float, t: float, h: float) -> float:
-    """The end of a step: that of a host that counts them, where its beginning is.
+    """End of a step [s]: a multiple of the step, if its beginning is one.
 
     Args:
         start: of the run [s].
@@ -74,7 +74,7 @@ def end_of_step(start: float, t: float, h: float) -> float:
 
 
 def advance_4(x: Vector4, dx: Vector4, h: float) -> Vector4:
-    """x + h dx: one step of a state of four components whose rate is dx."""
+    """Euler step x + h dx of a state with four components."""
     x_1, x_2, x_3, x_4 = x
     dx_1, dx_2, dx_3, dx_4 = dx
     return x_1 + h * dx_1, x_2 + h * dx_2, x_3 + h * dx_3, x_4 + h * dx_4

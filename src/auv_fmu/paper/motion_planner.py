@@ -33,15 +33,15 @@ ETA_D0: Vector5 = (0.0, 0.0, -2.0, 0.0, 0.0)
 #: Initial velocity (u, v, w, q, r) [m/s, rad/s]: at rest, which section 4.1 does not say.
 NU_D0: Vector5 = (0.0, 0.0, 0.0, 0.0, 0.0)
 
-#: Steepest pitch of the reference [rad]. At 90 degrees (1) has a pole: near it the yaw turns as
-#: fast as one likes, and a step leaps over it.
+#: Steepest pitch of the reference [rad]. At 90 degrees (1) has a pole: near it the yaw rate is
+#: unbounded, and a step may jump past it.
 STEEPEST = radians(85.0)
 
 _UNDISTURBED = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class SteepReference(ArithmeticError):
-    """The reference vehicle stands on its nose or on its tail."""
+    """The pitch of the reference vehicle is too steep."""
 
 
 class Parameters(NamedTuple):
@@ -64,7 +64,7 @@ class PlannerState(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What (1) and (2) say at a state; both its step and its reference follow from it."""
+    """Attitude by (1) and accelerations by (2), from which step and reference follow."""
 
     rotation: Rotation  #: body to earth
     dnu: Vector5  #: d/dt (u, v, w, q, r) [m/s2, rad/s2]
@@ -127,7 +127,7 @@ def step(state: PlannerState, moving: Motion, h: float) -> PlannerState:
 
 
 def reference(state: PlannerState, moving: Motion, ell: float) -> Reference:
-    """y_d, dy_d/dt and d2y_d/dt2 in closed form: (9), (10) and the derivative of (10).
+    """Reference y_d, dy_d/dt and d2y_d/dt2 in closed form: (9), (10) and the derivative of (10).
 
     With a = (u, v + ell r, w - ell q) equation (10) reads dy = R a, and hence
     d2y = R (da/dt + omega x a). With roll held at zero R turns at omega = (-r tan(theta), q, r).

@@ -1,7 +1,7 @@
 """The proposed controller: saturated output feedback, equations (16) to (24) and (48) to (51).
 
 Theorem 2 restates (21) to (24) as (48) to (51) with a general saturation function s in place of
-Tanh, so the general form is written and s is a parameter. All matrices of gains are diagonal.
+Tanh. The code has the general form, with s as a parameter. All matrices of gains are diagonal.
 :func:`evaluate` is the law, line by line in the order of computation.
 """
 
@@ -112,7 +112,7 @@ class Gains(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """What the controller is told. No velocity of the vehicle is in it."""
+    """Inputs of the controller, without any velocity of the vehicle."""
 
     y: Annotated[Vector3, Variable(POSITION, "Measured control point")]
     euler: Annotated[Vector3, Variable(EULER, "Measured Euler angle", name="eta")]
@@ -125,13 +125,13 @@ class ControllerState(NamedTuple):
     """States of the observer and of the adaptive law."""
 
     y_hat: Vector3  #: estimated control point [m]
-    dy_hat_o: Vector3  #: of (23) and (24), or its integral [m/s]; dy_o is another (reading 15)
+    dy_hat_o: Vector3  #: dy_hat_o of (23), (24) or the integral [m/s]; not dy_o (reading 15)
     theta_hat: Vector4  #: estimated parameters [N, kg/s, kg/m, kg]
-    h: float  #: length of the last step [s]; 0: there was none
+    h: float  #: length of the last step [s]; 0 before the first
 
 
 class Signals(NamedTuple):
-    """Everything the law computes from a state and a measurement."""
+    """Results of the law for a state and a measurement."""
 
     tau: Vector3  #: commanded (tau_u, tau_q, tau_r) [N, N.m]
     dy_hat: Vector3  #: estimated velocity of the control point [m/s]
@@ -142,7 +142,7 @@ class Signals(NamedTuple):
 
 
 def initial_state(gains: Gains, y: Vector3) -> ControllerState:
-    """The initial conditions below (24): y_hat(0) = y(0), and theta_hat(0) = theta_0."""
+    """Initial conditions below (24): y_hat(0) = y(0), and theta_hat(0) = theta_0."""
     y_hat = y
     z = sub(y, y_hat)
     dy_hat_o = observer.initial_dy_hat_o(saturation(gains.s, z), z, gains.lambda_, gains.k_d)
@@ -150,7 +150,7 @@ def initial_state(gains: Gains, y: Vector3) -> ControllerState:
 
 
 def credible(gains: Gains, state: ControllerState, y: Vector3) -> bool:
-    """Whether a measurement lies where a vehicle can have moved to. Not in the paper.
+    """True if the vehicle can have moved to a measured position. Not in the paper.
 
     Args:
         gains: of the controller; `innovation_gate` [m] is the threshold, 0 turns it off.
@@ -163,11 +163,11 @@ def credible(gains: Gains, state: ControllerState, y: Vector3) -> bool:
 
 
 def restarted(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
-    """The state with an observer that begins anew, at a measurement that is not credible.
+    """State with the observer restarted at a measurement that is not credible.
 
-    Not in the paper. A host without an exchange of initial values hands the controller zeros
-    in its first step; without this the observer would be kicked by k_d times the distance
-    to the origin. theta_hat is kept.
+    Not in the paper. Hosts that do not exchange initial values pass zeros to the controller in the
+    first step; without a restart the estimated velocity would jump by k_d times the distance to the
+    origin. theta_hat is kept.
 
     Args:
         gains: of the controller.
@@ -180,18 +180,18 @@ def restarted(gains: Gains, state: ControllerState, y: Vector3) -> ControllerSta
 
 
 def gated(gains: Gains, state: ControllerState, y: Vector3) -> ControllerState:
-    """The state, with a restarted observer if the measurement y [m] is not credible."""
+    """State, with a restarted observer if the measurement y [m] is not credible."""
     return state if credible(gains, state, y) else restarted(gains, state, y)
 
 
 def evaluate(gains: Gains, state: ControllerState, measurement: Measurement, h: float) -> Signals:
-    """The control law at one instant: (16) to (24), or (48) to (51).
+    """Equations (16) to (24), or (48) to (51): the control law at one instant.
 
     Args:
         gains: of the controller.
         state: of observer and adaptive law.
         measurement: at the same instant.
-        h: step that begins there, which the gain of an `exact` observer follows from [s]; 0: none.
+        h: length of the step that begins there [s], for the gain of an `exact` observer; 0: none.
 
     """
     K2, lambda_, k_d, s = gains.K2, gains.lambda_, gains.k_d, gains.s
@@ -232,8 +232,7 @@ def step(state: ControllerState, signals: Signals, h: float) -> ControllerState:
     Args:
         state: at the beginning of the step.
         signals: evaluated there, for a step of this length.
-        h: step [s]; `observer_rate` of :mod:`auv_fmu.proof.gain_conditions` tells which k_d it can
-            follow.
+        h: step [s]; `observer_rate` of :mod:`auv_fmu.proof.gain_conditions` limits k_d for it.
 
     """
     return ControllerState(

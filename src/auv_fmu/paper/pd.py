@@ -53,7 +53,7 @@ class PdGains(NamedTuple):
 
 
 class PdMeasurement(NamedTuple):
-    """What the controller is told: the velocity of the control point is in it."""
+    """Inputs of the controller, among them the velocity of the control point."""
 
     y: Annotated[Vector3, Variable(POSITION, "Measured control point")]
     euler: Annotated[Vector3, Variable(EULER, "Measured Euler angle", name="eta")]
@@ -64,7 +64,7 @@ class PdMeasurement(NamedTuple):
 
 
 class PdSignals(NamedTuple):
-    """Everything the law computes from a state and a measurement."""
+    """Results of the law for a state and a measurement."""
 
     tau: Vector3  #: commanded (tau_u, tau_q, tau_r) [N, N.m]
     e: Vector3  #: tracking error y - y_d [m]
@@ -72,7 +72,7 @@ class PdSignals(NamedTuple):
 
 
 def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> PdSignals:
-    """The control law (57) and the rate of its parameters (58).
+    """Equations (57) and (58): the control law and the rate of its parameters.
 
     Args:
         gains: of the controller.
@@ -85,7 +85,7 @@ def evaluate(gains: PdGains, theta_hat: Vector4, measurement: PdMeasurement) -> 
     r = add_scaled(sub(dy, dy_d), gains.lambda_, e)  # below (57): de + Lambda e
     G = regressor(dy_d, ddy_d)  # below (57)
     rho_hat = bound(G, theta_hat)  # below (57)
-    F = sub(neg_diag(gains.K1, r), robust_force(rho_hat, r, gains.eps_t))  # of (57)
+    F = sub(neg_diag(gains.K1, r), robust_force(rho_hat, r, gains.eps_t))  # bracket of (57)
     rotation = rotation_from_euler(0.0 if gains.printed_jacobian else phi, theta, psi)
     tau = actuator_command(rotation, F, gains.ell)  # (57), J^T F
     dtheta_hat = theta_hat_rate(

@@ -1,10 +1,10 @@
 """The simulated vehicle with six degrees of freedom: section 4.1.
 
-The controller is derived on five degrees of freedom; the paper simulates six and takes "the
-roll interaction as an external disturbance". The plant does that to the letter: the terms that
-roll adds to (2) enter through tau_w, so (2) stands once and is met exactly when p = 0
-(reading 1). Not in the paper, and off by default: roll that is held at zero, which leaves only
-(1) and (2), water that moves, actuators with dynamics, and an integrator of fourth order.
+The controller is derived for five degrees of freedom; the paper simulates six and takes "the
+roll interaction as an external disturbance". The plant does so literally: the terms that roll adds
+to (2) enter through tau_w, so the code has (2) once, and it holds exactly when p = 0 (reading 1).
+Not in the paper, and off by default: roll that is held at zero, which leaves only (1) and (2),
+water that moves, actuators with dynamics, and an integrator of fourth order.
 """
 
 from __future__ import annotations
@@ -52,18 +52,18 @@ _STILL = (0.0, 0.0, 0.0)
 
 
 class Integrator(IntEnum):
-    """A way to integrate (1) and (2) over a step."""
+    """Scheme that integrates (1) and (2) over a step."""
 
-    EULER = 0  #: Euler's scheme, which section 4.1 simulates with
+    EULER = 0  #: Euler's scheme, as in section 4.1
     RK4 = 1  #: the classical Runge-Kutta scheme of fourth order; not in the paper
 
 
-#: Each by a name of its own, which Python finds faster than in the class.
+#: Module-level names, which Python looks up faster than members of the class.
 EULER, RK4 = Integrator
 
 
 class RollAxis(NamedTuple):
-    """What the sixth degree of freedom adds to :class:`~auv_fmu.paper.vehicle.Vehicle`."""
+    """Parameters of roll, in addition to :class:`~auv_fmu.paper.vehicle.Vehicle`."""
 
     m44: Annotated[float, Variable("kg.m2", "Roll inertia with added inertia", POSITIVE)] = 22.5
     d44: Annotated[float, Variable("kg.m2/s", "Linear damping of roll", 0.0)] = 20.0
@@ -86,7 +86,7 @@ class RollAxis(NamedTuple):
 
 
 class Localisation(NamedTuple):
-    """The localisation system; section 4.1 gives none of its numbers (reading 7)."""
+    """The localisation system, without numbers in section 4.1 (reading 7)."""
 
     std: Annotated[
         float,
@@ -131,7 +131,7 @@ class Parameters(NamedTuple):
 
 
 class PlantState(NamedTuple):
-    """Motion of the vehicle, and what drives it."""
+    """Motion of the vehicle, with its actuators and the water."""
 
     position: Vector3  #: centre of mass (x, y, z) [m], earth frame
     quaternion: Vector4  #: attitude, body to earth, scalar first
@@ -141,7 +141,7 @@ class PlantState(NamedTuple):
 
 
 class PlantOutputs(NamedTuple):
-    """What can be seen of the vehicle."""
+    """Outputs of the vehicle."""
 
     euler: Vector3  #: roll, pitch, yaw [rad]
     y: Vector3  #: control point [m], earth frame, without measurement noise
@@ -151,18 +151,18 @@ class PlantOutputs(NamedTuple):
 
 
 class Rates(NamedTuple):
-    """What (1) and (2) say at a state."""
+    """Rates of the state by (1) and (2)."""
 
     position: Vector3  #: [m/s], earth frame
-    attitude: Vector4  #: of the quaternion; without roll, of (0, 0, theta, psi) [1/s, rad/s]
+    attitude: Vector4  #: rate of the quaternion; without roll, of (0, 0, theta, psi) [1/s, rad/s]
     nu_r: Vector6  #: d/dt (u, v, w, p, q, r) [m/s2, rad/s2]
 
 
 def over_ground(nu_r: Vector6, rotation: Rotation, water: Vector3) -> Vector6:
     """Velocity over ground of a vehicle that moves through water with nu_r [m/s, rad/s].
 
-    A constant current without rotation enters (2) only through this: the terms of (2) take the
-    velocity through the water in the place of nu (Fossen).
+    A constant current without rotation enters (2) only in this way: in the terms of (2) the
+    velocity through the water replaces nu (Fossen).
 
     Args:
         nu_r: (u, v, w, p, q, r) through the water, body frame.
@@ -181,11 +181,11 @@ def over_ground(nu_r: Vector6, rotation: Rotation, water: Vector3) -> Vector6:
 def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantState:
     """The same motion over ground, in water that moves at another velocity.
 
-    Water whose velocity changes at an instant changes the velocity through the water, as a vehicle
-    with a mass keeps its own. What :func:`carried` knows of the change is no longer part of it.
+    If the velocity of the water jumps, the velocity through the water jumps too, because the
+    vehicle keeps its own. Changes that :func:`carried` has applied are not counted again.
 
     Args:
-        state: of the vehicle, in whatever water it has been.
+        state: of the vehicle, in water of another velocity.
         rotation: body to earth, of its quaternion.
         water: velocity of the water from now on [m/s], earth frame.
 
@@ -199,17 +199,17 @@ def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantStat
 
 
 def carried(state: PlantState, dwater: Vector3, h: float) -> PlantState:
-    """The state after a step in which the water has speeded up, from that after a step without.
+    """State after a step with accelerating water, from the state after a step without.
 
-    Water that speeds up takes a neutrally buoyant vehicle along, as it would take itself. With the
-    mass m of the vehicle and of the water that it displaces, the added mass A and the acceleration
-    a of the water, both forces of the water (Froude-Krylov m a, added mass A (a - dv/dt)) give
+    Accelerating water carries a neutrally buoyant vehicle along like the water that it displaces.
+    With the mass m of both, the added mass A and the acceleration a of the water, the forces of the
+    water (Froude-Krylov m a, added mass A (a - dv/dt)) give
 
         m dv/dt = m a + A (a - dv/dt) + ...,   so   (m + A) d(v - water)/dt = ...
 
-    So (2) holds for the velocity through the water as in still water, and m + A, which is the M of
-    (2), need not be known in its parts. Only the velocity over ground changes, by that of the
-    water: over the step by h a, and the position by h^2 a / 2 more.
+    So (2) holds for the velocity through the water as in still water, with M = m + A as a whole.
+    Only the motion over ground changes: the velocity by h a over the step, and the position by
+    h^2 a / 2.
 
     Args:
         state: of the vehicle after the step, with the water as it was at the beginning.
@@ -232,7 +232,7 @@ def carried(state: PlantState, dwater: Vector3, h: float) -> PlantState:
 def accelerations_6dof(
     vehicle: Vehicle, roll: RollAxis, nu: Vector6, rotation: Rotation, tau: Vector3, tau_w: Vector6
 ) -> Vector6:
-    """Body-fixed accelerations with roll: (2) and the terms of a diagonal M that p adds.
+    """Equation (2) with roll, for a diagonal M: body-fixed accelerations.
 
     Args:
         vehicle, roll: parameters.
@@ -281,13 +281,13 @@ def rates(
     tau: Vector3,
     tau_w: Vector6,
 ) -> Rates:
-    """How the motion changes: (1) and (2).
+    """Equations (1) and (2): rates of the motion.
 
     Args:
         vehicle, roll: parameters.
         state: of the vehicle.
         rotation: body to earth, of its quaternion.
-        tau: (tau_u, tau_q, tau_r) that acts [N, N.m].
+        tau: applied (tau_u, tau_q, tau_r) [N, N.m].
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
 
     """
@@ -308,14 +308,14 @@ def rates(
 def moved(
     roll: RollAxis, state: PlantState, rotation: Rotation, rate: Rates, tau: Vector3, h: float
 ) -> PlantState:
-    """The state that h seconds at constant rates lead to.
+    """State after h seconds at constant rates.
 
     Args:
         roll: parameters.
         state: of the vehicle.
         rotation: body to earth, of its quaternion.
         rate: of the state.
-        tau: (tau_u, tau_q, tau_r) that acts after that time [N, N.m].
+        tau: applied (tau_u, tau_q, tau_r) after that time [N, N.m].
         h: time [s].
 
     """
@@ -344,8 +344,8 @@ def step(
     Args:
         parameters: of the plant.
         state: at the beginning of the step.
-        rotation: body to earth, of its quaternion; its outputs need it too.
-        acting: what the actuators give.
+        rotation: body to earth, of its quaternion.
+        acting: outputs of the actuators.
         tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
         h: step [s].
 
@@ -363,7 +363,7 @@ def step_rk4(
     tau_w: Vector6,
     h: float,
 ) -> PlantState:
-    """One step of the classical Runge-Kutta scheme under held inputs; arguments as of Euler's."""
+    """One step of the classical Runge-Kutta scheme under held inputs; arguments as for `step`."""
     vehicle, roll = parameters.vehicle, parameters.roll
     one = rates(vehicle, roll, state, rotation, acting.first, tau_w)
     near = moved(roll, state, rotation, one, acting.middle, 0.5 * h)
@@ -380,7 +380,7 @@ def step_rk4(
 
 
 def weighted(one: Rates, two: Rates, three: Rates, four: Rates) -> Rates:
-    """The mean rates of a step, of those at its beginning, twice halfway, and at its end."""
+    """Mean rates of a step, from rates at its beginning, twice halfway, and at its end."""
     return Rates(
         (
             mean(one.position[0], two.position[0], three.position[0], four.position[0]),
@@ -424,22 +424,22 @@ def begin(parameters: Parameters, water: Vector3) -> PlantState:
 
 
 def flow(parameters: Parameters, water: Vector3) -> Vector3:
-    """Velocity of the water: the parameter `current` and what is told beside it [m/s]."""
+    """Velocity of the water: the parameter `current` plus the input [m/s]."""
     return add(parameters.current, water)
 
 
 def applied(parameters: Parameters, tau: Vector3) -> Vector3:
-    """What the limits (3) leave of a command (tau_u, tau_q, tau_r) [N, N.m]."""
+    """Equation (3): a command (tau_u, tau_q, tau_r) within the limits [N, N.m]."""
     return limit_all(tau, parameters.limits.tau_min, parameters.limits.tau_max)
 
 
 def actuation(parameters: Parameters, state: PlantState, tau: Vector3) -> Vector3:
-    """What the actuators give (tau_u, tau_q, tau_r) [N, N.m].
+    """Outputs of the actuators (tau_u, tau_q, tau_r) [N, N.m].
 
     Args:
         parameters: of the plant.
         state: of the vehicle.
-        tau: what they are to give, after the limits of (3) [N, N.m].
+        tau: command after the limits of (3) [N, N.m].
 
     """
     return given(state.tau, tau, parameters.T)
@@ -486,7 +486,7 @@ def outputs(state: PlantState, rotation: Rotation, ell: float, rolls: bool) -> P
         state: of the vehicle.
         rotation: body to earth, of its quaternion.
         ell: distance of the control point [m].
-        rolls: whether the vehicle does.
+        rolls: True if roll is free.
 
     """
     position, _, nu_r, _, water = state
@@ -501,10 +501,10 @@ def outputs(state: PlantState, rotation: Rotation, ell: float, rolls: bool) -> P
 
 
 def white_noise(seed: int) -> Random:
-    """The generator of the localisation system's noise, another one for each seed.
+    """Generator of the localisation system's noise.
 
     Args:
-        seed: any 32-bit integer. Random takes the magnitude of its seed.
+        seed: any 32-bit integer. It is made positive, because Random ignores the sign.
 
     """
     return Random(seed % 2**32)

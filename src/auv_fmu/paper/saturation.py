@@ -16,24 +16,24 @@ class Saturation(IntEnum):
 
     TANH = 0  #: tanh(xi)
     ALGEBRAIC = 1  #: xi / sqrt(1 + xi^2)
-    ARCTAN = 2  #: (2 / pi) atan(xi), whose slope is another: Theorem 2 weighs K_1 with it
+    ARCTAN = 2  #: (2 / pi) atan(xi), with another slope, which Theorem 2 weights K_1 with
 
 
-#: Each by a name of its own, which Python finds faster than in the class.
+#: Module-level names, which Python looks up faster than members of the class.
 TANH, ALGEBRAIC, ARCTAN = Saturation
 
-#: Scales the arc tangent to the bound M = 1; its slope at 0.
+#: Scales the arc tangent to the bound M = 1; also its slope at 0.
 _SCALE = 2.0 / pi
 
 #: Largest slope s'_M of Lemma 1 of each.
 MAXIMUM_SLOPE = {Saturation.TANH: 1.0, Saturation.ALGEBRAIC: 1.0, Saturation.ARCTAN: _SCALE}
 
-#: From here on 1 + xi^2 is xi^2 apart from rounding, and not much later too large for a float.
+#: From here on 1 + xi^2 is xi^2 apart from rounding; xi^2 may overflow.
 _LARGE = 1e9
 
 
 def saturation(s: Saturation, xi: Vector3) -> Vector3:
-    """s(xi), for the saturation function s: M = 1 for each of them."""
+    """s(xi) of the saturation function s, with M = 1."""
     if s == TANH:
         return tanh(xi[0]), tanh(xi[1]), tanh(xi[2])
     if s == ALGEBRAIC:
@@ -42,7 +42,7 @@ def saturation(s: Saturation, xi: Vector3) -> Vector3:
 
 
 def slope(s: Saturation, xi: Vector3, s_xi: Vector3) -> Vector3:
-    """The diagonal of S'(xi): Sech^2(xi), (1 + xi_i^2)^(-3/2), or (2 / pi) / (1 + xi_i^2).
+    """Diagonal of S'(xi): Sech^2(xi), (1 + xi_i^2)^(-3/2), or (2 / pi) / (1 + xi_i^2).
 
     Args:
         s: the saturation function.

@@ -29,7 +29,7 @@ class Vehicle(NamedTuple):
 
 
 def euler_rates(theta: float, q: float, r: float) -> tuple[float, float]:
-    """Rates of pitch and yaw: T_2 of (1), for a vehicle whose roll is held at zero.
+    """T_2 of (1): rates of pitch and yaw of a vehicle whose roll is held at zero.
 
     Args:
         theta: pitch angle [rad]; the yaw rate has a pole at +-pi/2.
@@ -48,12 +48,12 @@ def euler_rates(theta: float, q: float, r: float) -> tuple[float, float]:
 def accelerations(
     vehicle: Vehicle, nu: Vector5, sin_theta: float, tau: Vector3, tau_w: Vector5
 ) -> Vector5:
-    """Body-fixed accelerations: equation (2).
+    """Equation (2): body-fixed accelerations.
 
     Args:
         vehicle: masses, damping and righting moment.
         nu: velocities (u, v, w, q, r) [m/s, rad/s], body frame.
-        sin_theta: sine of the pitch angle; the righting moment acts on nothing else.
+        sin_theta: sine of the pitch angle, for the righting moment.
         tau: applied force and moments (tau_u, tau_q, tau_r) [N, N.m].
         tau_w: disturbance (u, v, w, q, r) [N, N.m]; it enters with a minus (reading 8).
 

@@ -1,7 +1,7 @@
-"""What Theorem 1 or 2 covers: the alphas of (40), and how far the region (33) can reach at most.
+"""Coverage of Theorems 1 and 2: the alphas of (40), and upper bounds on the region (33).
 
-The zetas are known from below only, so all that follows from them is known from above: what is
-said here to be covered by no choice is covered by none.
+Only lower bounds of the zetas are known, so the numbers here are upper bounds: what no choice of
+gains covers by them is not covered.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from auv_fmu.proof.gain_conditions import (
 
 
 class Alphas(NamedTuple):
-    """What alpha_1 to alpha_4 [W], which (40) leaves of (37), are at most; two need no zetas."""
+    """Upper bounds of alpha_1 to alpha_4 in (40), the bound on (37) [W]; two are exact."""
 
     alpha_1: float
     alpha_2: float
@@ -38,23 +38,23 @@ class Theorem(NamedTuple):
     zetas: Zetas
     conditions: tuple[Condition, Condition, Condition]
     alphas: Alphas
-    x_at_most: float  #: |x| at which (42) may hold, at most, with these gains
+    x_at_most: float  #: largest |x| at which (42) may hold with these gains
     x_of_any_gains: float  #: the same with any gains
-    zeta_of_any_gains: float  #: what 0.5 (zeta_1 + zeta_2) of (31) is at least with any gains
-    speed_of_any_gains: float  #: with any gains and v0, |r_1| of (42) and the reference are slower
-    alpha_1_of_any_gains: float  #: alpha_1 where (31) holds, at most, with any gains and v0 [W]
+    zeta_of_any_gains: float  #: lower bound of 0.5 (zeta_1 + zeta_2) of (31) with any gains
+    speed_of_any_gains: float  #: upper bound of |r_1| of (42) and |dy_d|, any gains and v0 [m/s]
+    alpha_1_of_any_gains: float  #: upper bound of alpha_1 where (31) holds, any gains and v0 [W]
     stretch: float  #: sqrt of the max in (33): |x| never exceeds this times |vartheta(0)|
 
     @property
     def radius(self) -> float:
-        """What the radius of the region of attraction (33) is at most; zero: it is empty."""
+        """Upper bound of the radius of the region of attraction (33); zero if it is empty."""
         return self.x_at_most / self.stretch if min(self.alphas) > 0.0 else 0.0
 
 
 def theorem(
     vehicle: Vehicle, ell: float, gains: Gains, maximum_slope: float, v0: float = 1.0
 ) -> Theorem:
-    """The conditions, the alphas and the region of attraction.
+    """Evaluate the conditions, the alphas and the region of attraction.
 
     Args:
         vehicle: parameters.
@@ -106,7 +106,7 @@ def alphas(
 
 
 def reach(room: float, k: float) -> float:
-    """What v0 |x| [m/s] is at most where (42) holds, even if (26) holds no further than there.
+    """Upper bound of v0 |x| [m/s] where (42) holds, with (26) required only up to this |x|.
 
     (42) and alpha_m <= alpha_3 ask for 2 zeta_1 + zeta_2 (1 + |x|^2) < 2 room; a chi_1 of
     k |r_1|^2 / 2 with |r_1| = v0 |x| asks for zeta_1 + zeta_2 |x| >= k v0 |x| / 2. As
@@ -114,7 +114,7 @@ def reach(room: float, k: float) -> float:
     :func:`.coupling`.
 
     Args:
-        room: lambda_d2 less what the gains take of it in (31) [kg/s].
+        room: lambda_d2 less the terms of the gains in (31) [kg/s].
         k: coupling [kg/m].
 
     """
@@ -122,7 +122,7 @@ def reach(room: float, k: float) -> float:
 
 
 def alpha_1_at_most(lambda_d2: float, k: float) -> float:
-    """What alpha_1 [W] is at most where (31) holds, whatever the gains and v0.
+    """Upper bound of alpha_1 [W] where (31) holds, for any gains and v0.
 
     (31) has k_2max < 2 v0 (lambda_d2 - k sqrt(v0^2 + lambda^2) / 4), and alpha_1 is
     k_2max (lambda / 2 - v0) at most. The product is largest at lambda = (2 + sqrt(5)) v0.
@@ -136,7 +136,7 @@ def alpha_1_at_most(lambda_d2: float, k: float) -> float:
 
 
 def ball(theta: float, eps_t: float, mu_sigma: float) -> float:
-    """sqrt(gamma / c) of (44), the radius of Omega_p, at the kappa of (41) that makes it least.
+    """Radius sqrt(gamma / c) of Omega_p in (44), with the kappa of (41) that minimises it.
 
     c is mu_sigma (1 - 0.5 / kappa^2) at most, and gamma = 0.5 mu_sigma kappa^2 theta^2 + 3 eps_t.
 
@@ -153,7 +153,7 @@ def stretch(known: Bounds, gains: Gains, maximum_slope: float, v0: float = 1.0) 
     """sqrt(max{lambda_u / lambda_x, lambda_max(Gamma^-1) / (2 lambda_x)}) of (46) and (33).
 
     (33) prints min for max, but (47) has a sum over both parts of vartheta, which only the larger
-    factor bounds. Lemma 1 (i) weighs k_2 by s'_MM.
+    factor bounds. Lemma 1 (i) weights k_2 with s'_MM.
 
     Args:
         known: eigenvalues of M_2.

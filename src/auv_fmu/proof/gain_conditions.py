@@ -1,14 +1,14 @@
-"""What is asked of the gains: (30) to (32) of Theorem 1, (52) to (54) of Theorem 2, Euler's scheme.
+"""Conditions on the gains: (30) to (32) of Theorem 1, (52) to (54) of Theorem 2, Euler's scheme.
 
-The zetas of (26) and (29) bound what the paper leaves unknown; here they are bounded from below. At
-|x| = 1, (26) and (29) are |chi_1| <= zeta_1 + zeta_2 and |chi_2| <= zeta_3 + zeta_4, so any state
-with |x| = 1 bounds the sums from below. The states taken here are a level vehicle without sway and
-heave, a reference at rest, and z = 0: then dy_r = -lambda s(e), and with e_1 ahead, e_2 to
-starboard and e_3 down, chi_1 and chi_2 are short products. There are no upper bounds: C_2 has a
-pole at the vertical, where P2.4 fails.
+The paper does not give the zetas of (26) and (29); here they are bounded from below. At |x| = 1,
+(26) and (29) are |chi_1| <= zeta_1 + zeta_2 and |chi_2| <= zeta_3 + zeta_4, so any state with |x| =
+1 bounds the sums from below. The states used here are a level vehicle without sway and heave, a
+reference at rest, and z = 0: then dy_r = -lambda s(e), and with e_1 ahead, e_2 to starboard and e_3
+down, chi_1 and chi_2 are short products. There are no upper bounds: C_2 has a pole at the vertical,
+where P2.4 fails.
 
-So a condition is stated as its left side, the known part of the right side, and what the zetas take
-at least. It is violated if they take more than there is, met if it has none, open otherwise.
+So a condition consists of its left side, the known part of the right side, and a lower bound of the
+zetas' term. It is violated if this bound exceeds the rest, met if it has no zetas, open otherwise.
 
 (30) adds N to N m/s, (31) adds N to kg/s, and |x| adds m/s to pure numbers: the paper counts speeds
 in m/s. In another unit v0, with r_1 / v0 and r_2 / v0 in x and with |chi_i| / v0 in (26) and (29),
@@ -29,14 +29,14 @@ from auv_fmu.paper.vehicle import Vehicle
 
 
 class Zetas(NamedTuple):
-    """What the sums of the zetas are at least [kg/s]."""
+    """Lower bounds of the sums of the zetas [kg/s]."""
 
-    zeta_1_2: float  #: of zeta_1 + zeta_2
-    zeta_3_4: float  #: of zeta_3 + zeta_4
+    zeta_1_2: float  #: zeta_1 + zeta_2
+    zeta_3_4: float  #: zeta_3 + zeta_4
 
 
 def coupling(vehicle: Vehicle, ell: float) -> float:
-    """k [kg/m] with |chi_1| = k |r_1|^2 / 2 for some r_1 of any size, whatever the gains.
+    """k [kg/m] with |chi_1| = k |r_1|^2 / 2 for some r_1 of any size, with any gains.
 
     A control point that moves sideways turns the vehicle; turning drives its sway, (7), and sway
     moves the control point. At dy_r = 0 that is all of chi_1 = -d(r_1), and at
@@ -52,13 +52,12 @@ def coupling(vehicle: Vehicle, ell: float) -> float:
 
 
 def at_least(vehicle: Vehicle, ell: float, lambda_: float, v0: float = 1.0) -> Zetas:
-    """What zeta_1 + zeta_2 and zeta_3 + zeta_4 are at least, for chi_1 and chi_2 as printed.
+    """Lower bounds of zeta_1 + zeta_2 and zeta_3 + zeta_4, for chi_1 and chi_2 as printed.
 
     With r_1 = (a, b, 0) and s(e) = (-c, 0, 0), chi_1 = -k b (a + lambda c) e_2 for the k of
     :func:`coupling`. With r_1 = (0, b, 0), s(e) = (c, 0, 0) and r_2 = (a, 0, 0), chi_2 has the part
-    -b (m66 / ell^3 (a + lambda c (2 - m11 / m22)) + d66 / ell^2) along e_2. Each is taken at the
-    a, b and c at which it is largest. In the plane of e_1 and e_3 pitch and heave stand for yaw and
-    sway.
+    -b (m66 / ell^3 (a + lambda c (2 - m11 / m22)) + d66 / ell^2) along e_2. Each is maximised over
+    a, b and c. In the plane of e_1 and e_3 pitch and heave replace yaw and sway.
 
     Args:
         vehicle: parameters.
@@ -77,7 +76,7 @@ def at_least(vehicle: Vehicle, ell: float, lambda_: float, v0: float = 1.0) -> Z
 
 
 def _largest(turning: float, damping: float) -> float:
-    """The largest b (turning a + damping) with a^2 + b^2 = 1."""
+    """Maximum of b (turning a + damping) with a^2 + b^2 = 1."""
     a = (sqrt(damping**2 + 8.0 * turning**2) - damping) / (4.0 * turning)
     return sqrt(1.0 - a * a) * (turning * a + damping)
 
@@ -89,7 +88,7 @@ class Bounds(NamedTuple):
     """Extreme eigenvalues of M_2 and D_2 over all attitudes (P2.1 and P2.6).
 
     M_2 = R P^-T M_1 P^-1 R^T with J = R P, and P has one entry 1 and two of size ell: the
-    eigenvalues are those of M_1 over 1 and ell^2, at every attitude. D_2 is alike.
+    eigenvalues are those of M_1 over 1 and ell^2, at every attitude. The same holds for D_2.
     """
 
     lambda_m2: float  #: smallest eigenvalue of M_2 [kg]
@@ -101,26 +100,26 @@ class Bounds(NamedTuple):
 class Condition(NamedTuple):
     """One inequality left > right + zetas."""
 
-    number: str  #: of the equation
-    statement: str  #: as the paper writes it
+    number: str  #: number of the equation
+    statement: str  #: as printed
     left: float
-    right: float  #: without the zetas
-    zetas: str  #: their term on the right; empty: none
-    least: float  #: what that term is at least
+    right: float  #: right side without the zetas
+    zetas: str  #: term of the zetas on the right; empty: none
+    least: float  #: lower bound of that term
 
     @property
     def room(self) -> float:
-        """What is there for the zetas."""
+        """Left side less the known part of the right side."""
         return self.left - self.right
 
     @property
     def margin(self) -> float:
-        """What is left at most; the condition is violated for certain if it is not positive."""
+        """Upper bound of the margin; the condition is violated if it is not positive."""
         return self.room - self.least
 
     @property
     def verdict(self) -> str:
-        """What is known for certain."""
+        """Verdict: violated, open or met."""
         if self.margin <= 0.0:
             return "violated"
         return "open" if self.zetas else "met"
@@ -149,11 +148,11 @@ def conditions(
     maximum_slope: float,
     v0: float = 1.0,
 ) -> tuple[Condition, Condition, Condition]:
-    """(52) to (54), which for tanh, with s'_MM = 1, are (30) to (32).
+    """Equations (52) to (54), which for tanh, with s'_MM = 1, are (30) to (32).
 
     Args:
         known: eigenvalues of M_2 and D_2.
-        zetas: what they are at least.
+        zetas: lower bounds.
         K1, K2: diagonals of K_1 and K_2 [N].
         lambda_: diagonal entry of Lambda [m/s].
         k_d: gain of the observer [1/s].
@@ -190,8 +189,8 @@ def conditions(
     )
 
 
-# What the Euler approximation of section 4.1 asks of the gains; not in the paper. A mode with the
-# rate p is multiplied by 1 - h p in a step: it changes its sign in every step above h p = 1, and
+# Conditions of the Euler approximation in section 4.1 on the gains; not in the paper. A step
+# multiplies a mode of the rate p by 1 - h p: it changes its sign in every step above h p = 1, and
 # grows above h p = 2.
 
 
@@ -211,7 +210,7 @@ def observer_rate(lambda_: float, k_d: float) -> float:
 
 
 def robust_rate(rho_hat: float, eps_t: float, lambda_m2: float) -> float:
-    """Rate at which the robust term damps the composite error, at most [1/s].
+    """Largest rate at which the robust term damps the composite error [1/s].
 
     rho_hat tanh(nu rho_hat r / eps_t) has the slope nu rho_hat^2 / eps_t at r = 0, and acts on
     inertias of lambda_m2 and more.

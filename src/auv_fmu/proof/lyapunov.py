@@ -1,4 +1,4 @@
-"""The Lyapunov function (34), or (55), and the composite errors (17) and (19) it is made of."""
+"""The Lyapunov function (34), or (55), and its composite errors (17) and (19)."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from auv_fmu.paper.vehicle import Vehicle
 
 
 class Errors(NamedTuple):
-    """What (34) weighs, with the true state of the vehicle."""
+    """Errors in (34), with the true state of the vehicle."""
 
     e: Vector3  #: tracking error y - y_d [m]
     z: Vector3  #: estimation error y - y_hat [m]
@@ -28,12 +28,12 @@ def composite_errors(
     lambda_: float,
     s: Saturation,
 ) -> tuple[Vector3, Vector3]:
-    """r_1 = dy - dy_r and r_2 = dy - dy_o [m/s]: equations (17) and (19).
+    """Equations (17) and (19): r_1 = dy - dy_r and r_2 = dy - dy_o [m/s].
 
     Args:
         dy, dy_d, dy_hat: true, desired and estimated velocity of the control point [m/s].
         e_z: e - z = y_hat - y_d [m].
-        z: estimation error that the observer has seen [m].
+        z: estimation error of the observer [m].
         lambda_: diagonal entry of Lambda [m/s].
         s: saturation function.
 
@@ -44,7 +44,7 @@ def composite_errors(
 
 
 def potential(e: Vector3, z: Vector3, K2: Vector3, s: Saturation) -> float:
-    """The sums over k_2i of (34) and (55) [J].
+    """Sums over k_2i in (34) and (55) [J].
 
     Args:
         e, z: tracking and estimation error [m].
@@ -77,7 +77,7 @@ def lyapunov(
     s: Saturation,
     ell: float,
 ) -> float:
-    """V of (34) or (55) [J] without its last term, which needs the unknown theta.
+    """Equation (34) or (55): V [J] without its last term, which needs the unknown theta.
 
     Args:
         vehicle: parameters.

@@ -1,7 +1,7 @@
-"""Fins and propeller that give a force and two moments: the static model of the tail, inverted.
+"""Allocation of a force and two moments to fins and propeller, by the inverse model of the tail.
 
-Not in the paper, whose vehicle takes tau_u, tau_q and tau_r themselves. A fin gives no moment
-without a flow past it, so what a moment needs depends on the speed through the water.
+Not in the paper, whose vehicle takes tau_u, tau_q and tau_r themselves. The moment of a fin depends
+on the flow past it, so the allocation depends on the speed through the water.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Parameters(NamedTuple):
 
 
 class Wanted(NamedTuple):
-    """What is wanted, and how fast the vehicle is."""
+    """Wanted force and moments, and velocity of the vehicle."""
 
     tau: Annotated[Vector3, Variable(TAU, "Wanted force and moments")]
     nu_r: Annotated[
@@ -57,16 +57,16 @@ class Wanted(NamedTuple):
 
 
 class Allocated(NamedTuple):
-    """What to command, and what comes of it."""
+    """Command, and the force and moments that it gives."""
 
     command: Annotated[Vector3, Variable(ACTUATOR, "Command of rudder, stern planes and propeller")]
     tau_attained: Annotated[Vector3, Variable(TAU, "Force and moments that the command gives")]
 
 
 def fin_angle(moment: float, effect: float, largest: float) -> float:
-    """The angle of a fin that gives a moment, as far as the fin goes [rad].
+    """Angle of a fin that gives a moment, within its limits [rad].
 
-    A fin without flow gives none: it goes as far as it can for any moment but zero.
+    A fin without flow gives none: for any moment but zero it goes to its limit.
 
     Args:
         moment: wanted [N.m].
@@ -80,15 +80,15 @@ def fin_angle(moment: float, effect: float, largest: float) -> float:
 
 
 def propeller_speed(tail: Tail, thrust: float, speed: float) -> float:
-    """The speed of the propeller that gives a thrust [rad/s].
+    """Speed of the propeller that gives a thrust [rad/s].
 
-    A propeller that advances brakes already when it turns slowly ahead, at most with the square
-    of its loss over four times its thrust at rest. It turns backwards only for more than that.
+    A propeller that advances and turns slowly ahead brakes, with up to the square of its loss over
+    four times its thrust at rest. It turns backwards only for more than that.
 
     Args:
         tail: parameters.
         thrust: wanted, before the deduction [N].
-        speed: with which the propeller advances [m/s].
+        speed: of advance of the propeller [m/s].
 
     """
     at_rest, loss = thrust_at_rest(tail), thrust_loss(tail, speed)
@@ -98,7 +98,7 @@ def propeller_speed(tail: Tail, thrust: float, speed: float) -> float:
 
 
 def allocate(tail: Tail, tau: Vector3, u: float, v: float, w: float) -> Allocated:
-    """Fins and propeller that give (tau_u, tau_q, tau_r), as far as their limits let them.
+    """Fins and propeller that give (tau_u, tau_q, tau_r) within their limits.
 
     The fins come first; the propeller makes up for their drag.
 
@@ -111,7 +111,7 @@ def allocate(tail: Tail, tau: Vector3, u: float, v: float, w: float) -> Allocate
     tau_u, tau_q, tau_r = tau
     lift_r = fin_lift(tail, tail.lift_r, u * u + v * v)
     lift_s = fin_lift(tail, tail.lift_s, u * u + w * w)
-    # Behind the centre, a rudder to starboard pushes the stern to port, and the planes as they do.
+    # At the stern, a rudder to starboard pushes to port; the stern planes act in the same way.
     delta_r = fin_angle(tau_r, -tail.x * lift_r, tail.delta_max)
     delta_s = -fin_angle(tau_q, -tail.x * lift_s, tail.delta_max)
     drag = lift_r * delta_r * delta_r + lift_s * delta_s * delta_s
@@ -123,12 +123,12 @@ def allocate(tail: Tail, tau: Vector3, u: float, v: float, w: float) -> Allocate
 
 
 def evaluate(parameters: Parameters, tau: Vector3, nu_r: Vector3) -> Allocated:
-    """The same with the speed that the parameters choose.
+    """Allocate with the measured or the nominal speed.
 
     Args:
         parameters: of the allocation.
         tau: wanted (tau_u, tau_q, tau_r) [N, N.m].
-        nu_r: velocity (u, v, w) through the water [m/s], body frame, used only where measured.
+        nu_r: velocity (u, v, w) through the water [m/s], body frame, used only if `measured`.
 
     """
     if parameters.measured:

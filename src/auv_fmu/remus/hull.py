@@ -1,6 +1,6 @@
 """The hull of the REMUS 100: its mass with added mass, its drag and lift, its righting moment.
 
-The hull is a spheroid with the added mass of Lamb's factors. The model is that of the class
+The hull is a spheroid with the added mass of Lamb's factors. The model is taken from the class
 `remus100` in PythonVehicleSimulator 1.0.1 (vehicles/remus100.py, lib/gnc.py). Not in the paper.
 Everything refers to the centre of buoyancy.
 """
@@ -18,16 +18,16 @@ from auv_fmu.language.vectors import Vector3, Vector6, add
 #: Mass of the water that a spheroid of 1.6 m by 0.19 m displaces [kg].
 DISPLACED = round(4.0 / 3.0 * pi * 1026.0 * 0.8 * 0.095 * 0.095, 12)
 
-#: Drag of a circular cylinder across the flow, per area: Hoerner's curve at B / (2 T) = 0.5, from
-#: the points of it in PythonVehicleSimulator (lib/gnc.py) to either side.
+#: Drag of a circular cylinder across the flow, per area: Hoerner's curve at B / (2 T) = 0.5,
+#: between its neighbouring points in PythonVehicleSimulator (lib/gnc.py).
 ACROSS = round(1.2108 + (0.5 - 0.4933) / (0.5585 - 0.4933) * (1.0836 - 1.2108), 12)
 
-#: Strips that the hull is cut into for the cross-flow drag.
+#: Number of strips of the hull for the cross-flow drag.
 _STRIPS = 20
 
 
 class Hull(NamedTuple):
-    """The hull, a spheroid that is as heavy as the water that it displaces."""
+    """The hull, a neutrally buoyant spheroid."""
 
     length: Annotated[float, Variable("m", "Length of the hull", POSITIVE)] = 1.6
     diameter: Annotated[float, Variable("m", "Diameter of the hull", POSITIVE)] = 0.19
@@ -45,7 +45,7 @@ class Hull(NamedTuple):
 
 
 class Drag(NamedTuple):
-    """What brakes the hull."""
+    """Drag and lift of the hull."""
 
     c_d: Annotated[
         float, Variable("1", "Drag along the hull, per frontal area", 0.0, name="drag.along")
@@ -92,9 +92,9 @@ class Drag(NamedTuple):
 
 
 class Inertia(NamedTuple):
-    """Masses and moments of inertia: what follows from the hull, and from nothing else."""
+    """Masses and moments of inertia, which depend on the hull only."""
 
-    i_x: float  #: of the hull about its centre of mass, roll [kg.m2]
+    i_x: float  #: inertia of the hull about its centre of mass, roll [kg.m2]
     i_y: float  #: the same, pitch and yaw [kg.m2]
     a_11: float  #: added mass in surge [kg]
     a_22: float  #: added mass in sway and heave [kg]
@@ -138,19 +138,19 @@ def inertia(hull: Hull) -> Inertia:
 
 
 def cross(a: Vector3, b: Vector3) -> Vector3:
-    """The vector product of a and b."""
+    """Vector product of a and b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def coriolis(hull: Hull, mass: Inertia, nu_r: Vector6) -> Vector6:
     """C(nu_r) nu_r: Coriolis and centripetal forces of hull and added mass.
 
-    The terms of added mass that couple pitch and yaw rates with u, v and w are left out, among them
-    the Munk moment: without quadratic damping of the rates they destabilise the model.
+    Terms of added mass that couple pitch and yaw rates with u, v and w are neglected, among them
+    the Munk moment: without quadratic damping of the rates they would destabilise the model.
 
     Args:
         hull: parameters.
-        mass: of it.
+        mass: of the hull.
         nu_r: (u, v, w, p, q, r) through the water [m/s, rad/s], body frame.
 
     """
@@ -202,7 +202,7 @@ def lift_and_drag(hull: Hull, drag: Drag, rho: float, u: float, v: float, w: flo
 
 
 def cross_flow(hull: Hull, drag: Drag, rho: float, v: float, r: float) -> tuple[float, float]:
-    """Drag of water that flows across the hull, by strips: sway force [N] and yaw moment [N.m].
+    """Cross-flow drag, by strips: sway force [N] and yaw moment [N.m].
 
     Args:
         hull, drag: parameters.
@@ -224,7 +224,7 @@ def cross_flow(hull: Hull, drag: Drag, rho: float, v: float, r: float) -> tuple[
 
 
 def righting(hull: Hull, phi: float, theta: float) -> Vector3:
-    """Moment (p, q, r) [N.m] of a centre of mass that is not the one of buoyancy."""
+    """Righting moment (p, q, r) [N.m] of a centre of mass below the centre of buoyancy."""
     weight = hull.mass * hull.gravity
     x, y, z = hull.r_bg
     across, down = cos(theta) * sin(phi), cos(theta) * cos(phi)

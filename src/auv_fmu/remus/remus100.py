@@ -1,8 +1,8 @@
-"""The REMUS 100, an underwater vehicle with fins and one propeller, whose numbers are published.
+"""The REMUS 100, an underwater vehicle with fins and one propeller, with published parameters.
 
-The model is that of the class `remus100` in PythonVehicleSimulator 1.0.1, by Fossen; the page of
-the component says where each number comes from and what is odd in it. Not in the paper. Everything
-refers to the centre of buoyancy, and the body frame lies in it: x forward, y to starboard, z down.
+The model is taken from the class `remus100` in PythonVehicleSimulator 1.0.1, by Fossen; the page of
+the component has the source of each number and the oddities. Not in the paper. Everything refers to
+the centre of buoyancy, the origin of the body frame: x forward, y to starboard, z down.
 """
 
 from __future__ import annotations
@@ -74,28 +74,28 @@ class RemusState(NamedTuple):
 def water_in_body(psi: float, water: Vector3) -> Vector3:
     """Velocity of the water [m/s] in a frame that turns with the yaw psi [rad] only.
 
-    In the model of PythonVehicleSimulator a current does not see roll and pitch.
+    The model of PythonVehicleSimulator neglects roll and pitch here.
     """
     x, y, z = water
     return x * cos(psi) + y * sin(psi), y * cos(psi) - x * sin(psi), z
 
 
 def through_water(state: RemusState) -> Vector6:
-    """(u, v, w, p, q, r) through the water [m/s, rad/s], body frame."""
+    """Velocity (u, v, w, p, q, r) through the water [m/s, rad/s], body frame."""
     u, v, w, p, q, r = state.nu
     u_c, v_c, w_c = water_in_body(state.euler[2], state.water)
     return u - u_c, v - v_c, w - w_c, p, q, r
 
 
 def tail_forces(tail: Tail, state: RemusState) -> Vector6:
-    """What fins and propeller give [N, N.m]; the propeller advances as fast as over ground."""
+    """Forces of fins and propeller [N, N.m]; the propeller advances at the speed over ground."""
     u, v, w, _, _, _ = through_water(state)
     over_ground = state.nu[0] * state.nu[0] + state.nu[1] * state.nu[1] + state.nu[2] * state.nu[2]
     return forces(tail, state.actuator, u, v, w, sqrt(over_ground))
 
 
 def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> Vector6:
-    """M d nu_r/dt + C(nu_r) nu_r + D(nu_r) nu_r + g(eta) = tau, solved for d nu/dt.
+    """Accelerations by M d nu_r/dt + C(nu_r) nu_r + D(nu_r) nu_r + g(eta) = tau.
 
     Args:
         parameters: of the vehicle.
@@ -135,7 +135,7 @@ def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> V
 
 
 def euler_rates(phi: float, theta: float, p: float, q: float, r: float) -> Vector3:
-    """Rates of roll, pitch and yaw [rad/s]; those of roll and yaw have a pole at +-pi/2 of pitch.
+    """Rates of roll, pitch and yaw [rad/s], with a pole at a pitch of +-pi/2.
 
     Args:
         phi, theta: roll and pitch [rad].
@@ -147,7 +147,7 @@ def euler_rates(phi: float, theta: float, p: float, q: float, r: float) -> Vecto
 
 
 def follow(before: float, command: float, T: float, h: float) -> float:
-    """A fin or propeller of first order after an explicit step; it follows at once if T <= h.
+    """State of a first-order fin or propeller after an Euler step; the command if T <= h.
 
     Args:
         before: angle [rad] or speed [rad/s] at the beginning of the step.
@@ -162,10 +162,10 @@ def follow(before: float, command: float, T: float, h: float) -> float:
 def step(
     parameters: Parameters, mass: Inertia, state: RemusState, command: Vector3, h: float
 ) -> RemusState:
-    """One step of Euler's scheme under a held command, with the order of PythonVehicleSimulator.
+    """One step of Euler's scheme under a held command, in the order of PythonVehicleSimulator.
 
-    The velocity advances with fins and propeller as they are at the beginning, the posture with the
-    velocity at the end.
+    The velocity advances with fins and propeller at the beginning of the step, the posture with the
+    velocity at its end.
 
     Args:
         parameters: of the vehicle.
@@ -198,11 +198,10 @@ def step(
 
 
 def carried(state: RemusState, dwater: Vector3, h: float) -> RemusState:
-    """The state after a step in which the water has speeded up, from that after a step without.
+    """State after a step with accelerating water, from the state after a step without.
 
-    As in :func:`auv_fmu.paper.plant.carried`: the vehicle is as heavy as the water that it
-    displaces, so its velocity over ground changes by that of the water, and that through the
-    water does not.
+    As in :func:`auv_fmu.paper.plant.carried`: the vehicle is neutrally buoyant, so its velocity
+    over ground changes with the water, and its velocity through the water does not.
 
     Args:
         state: of the vehicle after the step, with the water as it was at the beginning.

@@ -1,8 +1,8 @@
-"""The tail of the REMUS 100: rudder, stern planes and propeller, and the forces that they give.
+"""The tail of the REMUS 100: rudder, stern planes and propeller, and their forces.
 
-The model is that of the class `remus100` in PythonVehicleSimulator 1.0.1 (vehicles/remus100.py),
-whose propeller has the thrust of a Wageningen series that is linear in the advance number. Not in
-the paper.
+The model is taken from the class `remus100` in PythonVehicleSimulator 1.0.1 (vehicles/remus100.py).
+The thrust of its propeller is linear in the advance number, after a Wageningen series. Not in the
+paper.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import Vector3, Vector6
 from auv_fmu.paper.actuators import limit
 
-#: The source of the model, and the paper whose numbers of equations stand beside it.
+#: Source of the model, and the paper of the equation numbers.
 __citation__ = (
-    "The model is that of the class remus100 in PythonVehicleSimulator 1.0.1, by T. I. Fossen. "
+    "The model is taken from the class remus100 in PythonVehicleSimulator 1.0.1, by T. I. Fossen. "
     f"{of_the_paper}"
 )
 
-#: Beyond this speed [m/s] through the water there is no model: it is four times the largest of the
-#: vehicle, and explicit steps of 20 ms are stable below it.
+#: Largest speed through the water [m/s], four times the largest of the vehicle. Explicit steps of
+#: 20 ms are stable below it.
 FASTEST = 10.0
 
-#: The same for the rate of turn [rad/s].
+#: Largest rate of turn [rad/s].
 FASTEST_TURN = 30.0
 
 
-#: Rudder, stern planes and propeller: what is commanded, and what they are.
+#: Rudder, stern planes and propeller, as commands and as states.
 ACTUATOR: Members = {"delta_r": "rad", "delta_s": "rad", "n": "rad/s"}
 
 
@@ -123,7 +123,7 @@ class Tail(NamedTuple):
 
 
 def limit_tail(tail: Tail, actuator: Vector3) -> Vector3:
-    """What fins and propeller can be of (delta_r, delta_s, n) [rad, rad, rad/s]."""
+    """(delta_r, delta_s, n) within the limits of fins and propeller [rad, rad, rad/s]."""
     delta_r, delta_s, n = actuator
     return (
         limit(delta_r, -tail.delta_max, tail.delta_max),
@@ -133,7 +133,7 @@ def limit_tail(tail: Tail, actuator: Vector3) -> Vector3:
 
 
 def fin_lift(tail: Tail, lift: float, squared_speed: float) -> float:
-    """The force of a pair of fins per angle [N/rad].
+    """Force of a pair of fins per angle [N/rad].
 
     Args:
         tail: parameters.
@@ -145,13 +145,13 @@ def fin_lift(tail: Tail, lift: float, squared_speed: float) -> float:
 
 
 def thrust_at_rest(tail: Tail) -> float:
-    """The thrust of the propeller per squared speed, in rev/s, of a vehicle at rest [N.s2]."""
+    """Thrust of the propeller per squared speed, in rev/s, for a vehicle at rest [N.s2]."""
     D = tail.diameter
     return tail.rho * D * D * D * D * tail.kt_0
 
 
 def thrust_loss(tail: Tail, speed: float) -> float:
-    """By how much the thrust falls per speed, in rev/s, of a propeller that advances [N.s].
+    """Loss of thrust per speed, in rev/s, of a propeller that advances [N.s].
 
     Args:
         tail: parameters.
@@ -171,7 +171,7 @@ def propeller(tail: Tail, n: float, speed: float) -> tuple[float, float]:
         speed: of the vehicle, not negative [m/s].
 
     Returns:
-        (thrust [N], torque [N.m]), before what the hull takes of either.
+        (thrust [N], torque [N.m]), without the deductions for the hull.
 
     """
     rev = n / (2.0 * pi)
@@ -186,13 +186,13 @@ def propeller(tail: Tail, n: float, speed: float) -> tuple[float, float]:
 
 
 def forces(tail: Tail, actuator: Vector3, u: float, v: float, w: float, speed: float) -> Vector6:
-    """What fins and propeller give.
+    """Forces of fins and propeller.
 
     Args:
         tail: parameters.
         actuator: (delta_r, delta_s, n) within their limits [rad, rad, rad/s].
         u, v, w: velocity through the water [m/s], body frame.
-        speed: with which the propeller advances [m/s].
+        speed: of advance of the propeller [m/s].
 
     Returns:
         Force and moment (u, v, w, p, q, r) [N, N.m], body frame.

@@ -1,7 +1,7 @@
-"""Water that moves: waves and currents. They are not in the paper, which has (56) instead.
+"""Moving water: waves and currents. Not in the paper, which has (56) instead.
 
 =====================  ===================================================
-module                 what it states
+module                 contents
 =====================  ===================================================
 :mod:`.waves`          a random sea, by linear theory
 :mod:`.ocean_current`  a mean with a profile over depth, and a random part

@@ -6,8 +6,8 @@ process in each horizontal direction,
 
     dv/dt + mu v = w,
 
-with white noise w, as Fossen (2021) describes the speed of a current. It is given by its standard
-deviation. Its exact solution is what a step takes, so steps of any length have the same statistics.
+with white noise w, as in Fossen (2021) for the speed of a current. Its parameter is the standard
+deviation. A step is exact, so steps of any length have the same statistics.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ class Current(NamedTuple):
 
 
 class Variation(NamedTuple):
-    """The random part of a current at the surface, and what its future is drawn from."""
+    """The random part of a current at the surface, with the state of the generator."""
 
     north: float  #: [m/s]
     east: float  #: [m/s]
@@ -61,7 +61,7 @@ class Variation(NamedTuple):
 
 
 def begin(current: Current) -> Variation:
-    """The variation at the start, drawn from its stationary distribution.
+    """Variation at the start, drawn from its stationary distribution.
 
     Args:
         current: parameters.
@@ -73,7 +73,7 @@ def begin(current: Current) -> Variation:
 
 
 def advance(current: Current, variation: Variation, h: float) -> Variation:
-    """The variation h seconds later.
+    """Variation h seconds later.
 
     Args:
         current: parameters.
@@ -91,12 +91,12 @@ def advance(current: Current, variation: Variation, h: float) -> Variation:
 
 
 def profile(root: float, z: float, depth: float) -> float:
-    """The current at a depth, as a share of that at the surface.
+    """Current at a depth, as a share of the current at the surface.
 
     Args:
         root: 1 / exponent of the power law; 0: the current is the same at all depths.
         z: depth below still water, from 0 to that of the bottom [m].
-        depth: of the water [m]; 0: it is deep, and the current the same at all depths.
+        depth: of the water [m]; 0: deep water, with the same current at all depths.
 
     """
     if depth == 0.0 or root == 0.0:
@@ -108,7 +108,7 @@ def slope(root: float, z: float, depth: float) -> float:
     """Derivative of :func:`profile` with respect to z [1/m]; at the bottom 0, not infinite.
 
     Args:
-        root, z, depth: as of the profile.
+        root, z, depth: as for :func:`profile`.
 
     """
     if depth == 0.0 or root == 0.0 or z == depth:
@@ -121,7 +121,7 @@ def velocity(current: Current, variation: Variation, share: float) -> Vector3:
 
     Args:
         current, variation: mean and random part.
-        share: the profile at a depth, or its slope.
+        share: profile at a depth, or its slope.
 
     """
     return (

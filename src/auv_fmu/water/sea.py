@@ -1,4 +1,4 @@
-"""The sea at a vehicle: waves and a current, neither of which changes the other."""
+"""The sea at a vehicle: waves and a current, without interaction."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from auv_fmu.water.waves import Components, Spectrum, Waves
 
 
 class ImpossibleSea(ArithmeticError):
-    """There are no such waves."""
+    """Such waves do not exist."""
 
 
 class Sea(NamedTuple):
@@ -27,7 +27,7 @@ class Sea(NamedTuple):
 
 
 class WaterMotion(NamedTuple):
-    """How water moves at a place."""
+    """Motion of the water at a place."""
 
     velocity: Annotated[
         Vector3, Variable(VELOCITY, "Velocity of the water in the earth frame", name="water")
@@ -65,7 +65,7 @@ def check(sea: Sea) -> None:
 
 
 def regular_waves(sea: Sea) -> Components:
-    """The waves that the sea is a sum of.
+    """Regular waves whose sum is the sea.
 
     Args:
         sea: parameters.
@@ -77,14 +77,14 @@ def regular_waves(sea: Sea) -> Components:
 def water(
     sea: Sea, components: Components, variation: Variation, position: Vector3, t: float
 ) -> WaterMotion:
-    """How the water moves at a place.
+    """Motion of the water at a place.
 
-    The acceleration is that of the water itself, du/dt + (u . grad) u. The velocity u is that of
-    waves and current; only the change of the current in time is left out.
+    The acceleration is the material derivative du/dt + (u . grad) u, with the velocity u of waves
+    and current; only the change of the current in time is neglected.
 
     Args:
         sea: parameters.
-        components: the waves that belong to them.
+        components: regular waves for these parameters.
         variation: of the current.
         position: (x, y, z) [m], earth frame, z down from the surface of still water.
         t: time [s].
@@ -92,11 +92,11 @@ def water(
     """
     moved = waves.motion(sea.waves, components, sea.depth, position, t)
     current, depth = sea.current, sea.depth
-    z = waves.within(position[2], depth)
+    z = waves.clamped(position[2], depth)
     share = ocean_current.profile(current.root, z, depth)
     velocity = add(moved.velocity, ocean_current.velocity(current, variation, share))
     u, v, w = velocity
-    # Above still water everything moves as on it.
+    # Above still water the motion is the same as at its surface.
     rise = w if position[2] >= 0.0 else 0.0
     shear = ocean_current.velocity(current, variation, ocean_current.slope(current.root, z, depth))
     convective = add_scaled(waves.along(moved.gradient, (u, v, rise)), rise, shear)

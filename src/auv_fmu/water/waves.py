@@ -1,25 +1,25 @@
 """Waves of a random sea: a sum of regular ones, by linear theory, in deep or in shallow water.
 
-The sea has the spectrum of Pierson and Moskowitz with two parameters (that of Bretschneider),
+The sea has the spectrum of Pierson and Moskowitz with two parameters (Bretschneider's spectrum),
 
     S(omega) = 5/16 Hs^2 omega_p^4 / omega^5 exp(-5/4 (omega_p / omega)^4),
 
-or that of JONSWAP, which is the same times gamma^exp(-((omega / omega_p - 1) / width)^2 / 2),
-with width 0.07 below the peak and 0.09 above it, at the same variance Hs^2 / 16. What
-lies above a highest frequency is left out, before the variance is made the same. Both spectra, and
-the spreading cos^2s(angle / 2) about the mean direction, are as in DNV-RP-C205.
+or the JONSWAP spectrum, the same times gamma^exp(-((omega / omega_p - 1) / width)^2 / 2), with
+width 0.07 below the peak and 0.09 above it, scaled to the same variance Hs^2 / 16. Both are cut off
+above a highest frequency before they are scaled. The spectra, and the spreading cos^2s(angle / 2)
+about the mean direction, are as in DNV-RP-C205.
 
-A sea of n regular waves has n equal shares of this variance. Each wave has a frequency at random
-within its share of the spectrum, so no record repeats, and a random phase. Directions are the same
-shares of the spreading, in the order of a Weyl sequence: neighbours in frequency differ most.
+Each of n regular waves has an equal share of this variance. Its frequency is random within its
+share of the spectrum, so no record repeats, and its phase is random. Directions have equal shares
+of the spreading, in the order of a Weyl sequence, so that neighbours in frequency differ most.
 
-The energy below omega is exp(-5/4 (omega_p / omega)^4) for Pierson and Moskowitz. It is what
-the spectrum of JONSWAP is integrated over: then nothing has to be cut off below the peak.
+The energy below omega is exp(-5/4 (omega_p / omega)^4) for Pierson and Moskowitz. The JONSWAP
+spectrum is integrated over this energy, so that no cut-off is needed below the peak.
 
 A regular wave of amplitude a moves water of depth h, at the depth z below its still surface, with
 
-    a omega cosh(k (h - z)) / sinh(k h) cos(chi)    in the direction that the wave goes to,
-    a omega sinh(k (h - z)) / sinh(k h) sin(chi)    upwards, where the surface has risen by
+    a omega cosh(k (h - z)) / sinh(k h) cos(chi)    in the direction of the wave,
+    a omega sinh(k (h - z)) / sinh(k h) sin(chi)    upwards, and the surface is raised by
     a cos(chi),  chi = k (distance in its direction) - omega t + phase,  and
     omega^2 = g k tanh(k h)                         is the dispersion relation.
 """
@@ -45,10 +45,10 @@ from auv_fmu.language.vectors import Vector3
 #: Most regular waves of a sea.
 MOST = 64
 
-#: Largest exponent of the spreading: narrower ones need finer angles than it is integrated over.
+#: Largest exponent of the spreading; narrower ones need finer angles than :data:`_ANGLES`.
 _NARROWEST = 100.0
 
-#: A spectrum. It is written as a call for the hyphen, which users select it with.
+#: Spectra, in functional form because of the hyphen in the name.
 Spectrum = IntEnum("Spectrum", {"NONE": 0, "PIERSON-MOSKOWITZ": 1, "JONSWAP": 2})
 
 #: Regular waves in rows of (omega [rad/s], k [rad/m], cosine and sine of the direction, phase
@@ -63,7 +63,7 @@ _WIDTH_ABOVE = 0.09
 #: Largest height of a wave of permanent form in deep water, as a share of its length.
 _STEEPEST = 0.142
 
-#: Intervals of equal energy that a spectrum is integrated over, and of equal angle a spreading.
+#: Numbers of intervals: of equal energy for a spectrum, of equal angle for a spreading.
 _CELLS = 1024
 _ANGLES = 360
 
@@ -107,7 +107,7 @@ class Waves(NamedTuple):
 
 
 class Gradient(NamedTuple):
-    """Of the velocity of waves [1/s]: symmetric, as they do not rotate, and zz = -xx - yy."""
+    """Gradient of the velocity of waves [1/s]: irrotational, so symmetric, with zz = -xx - yy."""
 
     xx: float
     xy: float
@@ -117,20 +117,20 @@ class Gradient(NamedTuple):
 
 
 class WaveMotion(NamedTuple):
-    """How waves move the water at a place."""
+    """Motion of the water by waves at a place."""
 
     velocity: Vector3  #: [m/s], earth frame
     acceleration: Vector3  #: [m/s2], earth frame, at the fixed place
-    gradient: Gradient  #: of the velocity
-    elevation: float  #: of the surface above that of still water [m]
+    gradient: Gradient  #: velocity gradient
+    elevation: float  #: elevation of the surface above still water [m]
 
 
 def wave_number(omega: float, depth: float, g: float) -> float:
-    """k of the dispersion relation, by Newton's method [rad/m].
+    """Wave number k of the dispersion relation, by Newton's method [rad/m].
 
     Args:
         omega: angular frequency [rad/s].
-        depth: of the water [m]; 0: it is deep.
+        depth: of the water [m]; 0: deep water.
         g: acceleration of gravity [m/s2].
 
     """
@@ -153,7 +153,7 @@ def highest_regular(omega: float, depth: float, g: float) -> float:
 
     Args:
         omega: its angular frequency [rad/s].
-        depth: of the water [m]; 0: it is deep.
+        depth: of the water [m]; 0: deep water.
         g: acceleration of gravity [m/s2].
 
     """
@@ -173,7 +173,7 @@ def frequency(share: float) -> float:
 
 
 def enhancement(waves: Waves, ratio: float) -> float:
-    """By how much the spectrum exceeds that of Pierson and Moskowitz, up to a factor.
+    """Ratio of the spectrum to the one of Pierson and Moskowitz, up to a factor.
 
     Args:
         waves: parameters.
@@ -236,7 +236,7 @@ def deviation(s: float, share: float) -> float:
     half = 0.0
     for i in range(_ANGLES):
         half += spread(s, (i + 0.5) * pi / _ANGLES)
-    # Both sides are alike: what is looked for is a share of one of them.
+    # Both sides are equal, so look for a share of one of them.
     wanted = abs(2.0 * share - 1.0) * half
     lower, upper, cell = 0.0, 0.0, -1
     while upper < wanted and cell < _ANGLES - 1:
@@ -254,7 +254,7 @@ def components(waves: Waves, depth: float, g: float) -> Components:
 
     Args:
         waves: parameters.
-        depth: of the water [m]; 0: it is deep.
+        depth: of the water [m]; 0: deep water.
         g: acceleration of gravity [m/s2].
 
     """
@@ -275,7 +275,7 @@ def components(waves: Waves, depth: float, g: float) -> Components:
 
 
 def amplitude(waves: Waves) -> float:
-    """Of each regular wave [m]: n times half its square is the variance Hs^2 / 16.
+    """Amplitude of each regular wave [m]: n times half its square is the variance Hs^2 / 16.
 
     Args:
         waves: parameters.
@@ -301,12 +301,12 @@ def attenuation(k: float, z: float, depth: float) -> tuple[float, float]:
     return direct * (1.0 + reflected) / whole, direct * -expm1(-2.0 * k * (depth - z)) / whole
 
 
-def within(z: float, depth: float) -> float:
-    """The depth at which water moves as it does at z: none is above still water or in the bottom.
+def clamped(z: float, depth: float) -> float:
+    """z, limited to the water: from 0 to the depth [m].
 
     Args:
         z: depth below still water [m].
-        depth: of the water [m]; 0: it is deep.
+        depth: of the water [m]; 0: deep water.
 
     """
     if z < 0.0:
@@ -315,11 +315,11 @@ def within(z: float, depth: float) -> float:
 
 
 def motion(waves: Waves, rows: Components, depth: float, position: Vector3, t: float) -> WaveMotion:
-    """How waves move the water.
+    """Motion of the water by waves.
 
     Args:
-        waves, rows: parameters, and the regular waves that belong to them.
-        depth: of the water [m]; 0: it is deep.
+        waves, rows: parameters, and the regular waves for them.
+        depth: of the water [m]; 0: deep water.
         position: (x, y, z) [m], earth frame, z down from the surface of still water.
         t: time [s].
 
@@ -327,7 +327,7 @@ def motion(waves: Waves, rows: Components, depth: float, position: Vector3, t: f
     if waves.spectrum == Spectrum.NONE:
         return WaveMotion(_STILL, _STILL, Gradient(0.0, 0.0, 0.0, 0.0, 0.0), 0.0)
     x, y, z = position
-    z = within(z, depth)
+    z = clamped(z, depth)
     a = amplitude(waves)
     u, v, w, du, dv, dw, elevation = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     xx, xy, yy, xz, yz = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -357,11 +357,11 @@ def motion(waves: Waves, rows: Components, depth: float, position: Vector3, t: f
 
 
 def along(gradient: Gradient, velocity: Vector3) -> Vector3:
-    """(velocity . grad) of the waves' velocity: its change along a way, per time [m/s2].
+    """(velocity . grad) of the waves' velocity: the convective acceleration [m/s2].
 
     Args:
         gradient: of the waves.
-        velocity: of what goes this way [m/s], earth frame.
+        velocity: of the point that moves [m/s], earth frame.
 
     """
     xx, xy, yy, xz, yz = gradient

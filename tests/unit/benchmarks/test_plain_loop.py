@@ -1,4 +1,4 @@
-"""The loop of Fig. 4 in C written by hand makes the numbers of the straight line."""
+"""The loop of Fig. 4 in C written by hand has the numbers of straight-line Python."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from auv_fmu.paper.actuators import Limits
 
 BENCHMARKS = Path(__file__).parents[3] / "benchmarks"
 
-#: Where a limit comes in a run: the commands of Fig. 4 reach none of its own.
+#: Limits that a run reaches, because the commands of Fig. 4 reach none of its own.
 NARROW = Limits((-6.0, -5.0, -4.0), (7.0, 3.0, 2.0))
 
 #: Numbers before the limits in the parameters of the program.

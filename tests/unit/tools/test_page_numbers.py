@@ -1,4 +1,4 @@
-"""The benchmarks: their commands, how a new measurement is kept, and what the page quotes of it."""
+"""The benchmarks: their commands, new measurements, and the numbers on the page."""
 
 from __future__ import annotations
 

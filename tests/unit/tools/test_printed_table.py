@@ -1,4 +1,4 @@
-"""The printed table: what is read off runs, against indices of FMUs and formulas by hand."""
+"""The tool for the printed table, compared with indices of FMUs and formulas by hand."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def variants(engine):
 
 
 def test_formulas_are_those_that_someone_would_code():
-    """By the rows themselves, at every end time."""
+    """From the rows, at several end times."""
     tau = np.random.default_rng(2).uniform(-80.0, 80.0, (10_000, 6))
     l2 = np.sqrt(np.cumsum(tau**2 * 0.02, axis=0))[np.round(END_TIMES / 0.02).astype(int) - 1]
     twelve = np.tile(0.01, (len(END_TIMES), 12))
@@ -95,7 +95,7 @@ def test_ours_is_what_the_scenarios_give_and_the_page_shows(variants):
     assert f"\n| score |  | {variants.scores[0, 0, T_F[100.0], 0]:.2f} | " in page
 
 
-def test_options_are_those_of_the_runs(variants):
+def test_options_have_the_numbers_of_runs(variants):
     """Jacobi order, eps_t = 1, as sums without the step at 57 s; for PD eps_t stays 10."""
     [i] = [
         i
@@ -163,7 +163,7 @@ OPTIONS = [
 
 @pytest.mark.parametrize(("scenario", "option"), OPTIONS)
 def test_every_option_changes_the_system(scenario, option):
-    """Each parameter is there, takes the value, and has another one in the scenario."""
+    """Each parameter exists, accepts the value, and has another one in the scenario."""
     _, system = load_scenario(scenario)
     for name, value in option.parameters.items():
         changed = system.with_parameters({PortName.read(name): value})

@@ -187,11 +187,11 @@ UP_80 = (10, 0, 10 * tan(radians(80.0)))
         ({"waypoints": CORNER, "turn_max": 0.4}, r"near waypoint 2, at \(19.* a turn of 0\.4"),
         ({"waypoints": path((0, 0, 0), (20, 0, 0), rounding=0.2)}, "waypoint 1.* surge force of"),
         ({"waypoints": CORNER._replace(rounding=1.0)}, r"at \(19\..*more tightly than .* 0.35 m"),
-        ({"waypoints": path((0, 0, 0), (9, 0, 0), (0, 0, 0))}, "back on the spot at waypoint 2"),
-        ({"waypoints": path((0, 0, 0), (9, 0, 0), (0, 0, 1e-12))}, "back on the spot"),
+        ({"waypoints": path((0, 0, 0), (9, 0, 0), (0, 0, 0))}, "straight back at waypoint 2"),
+        ({"waypoints": path((0, 0, 0), (9, 0, 0), (0, 0, 1e-12))}, "straight back"),
         (
             {"waypoints": path((0, 0, 0), (9, 0, 0), (1, 0, 0), t=(9.0, 29.0, 39.0))},
-            "turns back on the spot at waypoint 2",
+            "turns straight back at waypoint 2",
         ),
         ({"waypoints": path((0, 0, 0), (0, 0, 9))}, "from waypoint 1 to 2 climbs or dives at 90"),
         ({"waypoints": path((0, 0, 0), (9, 0, 0), (9, 0, 0))}, "waypoints 2 and 3 are the same"),
@@ -223,7 +223,7 @@ def is_too_steep(waypoints: Waypoints) -> bool:
     try:
         path_planner._check_pitch(waypoints)
     except ImpossiblePath as error:
-        assume("climbs or dives" in str(error))  # or it turns back on the spot
+        assume("climbs or dives" in str(error))  # or it turns straight back
         return True
     return False
 

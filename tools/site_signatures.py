@@ -1,4 +1,4 @@
-"""An extension of griffe: functions whose arguments a decorator makes are shown with these."""
+"""An extension of griffe that shows the arguments which a decorator gives to a function."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _PREFIX = re.compile(r"\b(?:[a-z_]+\.)+(?=[A-Z])")
 
 
 class Signatures(griffe.Extension):
-    """Takes signature and docstring of decorated functions from the imported module."""
+    """Take signature and docstring of decorated functions from the imported module."""
 
     def on_function(self, *, func: griffe.Function, **_: Any) -> None:
-        """Replace what was read from the source."""
+        """Replace signature and docstring from the source."""
         if func.docstring is None or not any(_DECORATOR in str(d.value) for d in func.decorators):
             return
         function = getattr(import_module(func.module.path), func.name)

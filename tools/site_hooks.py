@@ -1,11 +1,11 @@
-"""What the site has beside the pages of docs/: a hook of `mkdocs build`.
+"""Pages of the site in addition to docs/: a hook of `mkdocs build`.
 
-- Pages of the repository's root, under `contributing` and `explanation`.
+- Pages of the repository's root, under `contributing` and `explanation`, and of the components.
 - The notebook as a page, with the output of its cells.
-- The live page, where npm and a compiler can make it; otherwise a page that says why it is missing.
+- The live page, or a page with the reason if npm or a compiler is missing.
 
-Links work in a plain checkout too, so they name files of the repository. Here they become links to
-the site's pages; a link to a file that the site does not have becomes plain text.
+Links in the sources name files of the repository, so that they also work in a checkout. Here they
+become links to the site's pages; a link to a file that is not in the site becomes plain text.
 """
 
 from __future__ import annotations
@@ -25,13 +25,18 @@ from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from nbclient import NotebookClient
 
+from fmus.discovery import components
 from orchestrator.live import presets
 from orchestrator.machine.errors import InputError
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 
-#: Where the site has the pages of the root; its home is another page than the README.
+#: Places in the site of pages from outside docs/; its home is another page than the README.
 PAGES = {
+    **{
+        "/".join((*module.split(".")[:-1], "page.md")): f"reference/components/{name}.md"
+        for name, module in components().items()
+    },
     "CONTRIBUTING.md": "contributing/README.md",
     "CHANGELOG.md": "contributing/changelog.md",
     "LICENSE": "contributing/licence.md",
@@ -40,7 +45,7 @@ PAGES = {
 
 LIVE = "live.html"
 
-#: What the search prefers, and what comes last: the beginning of a page's place.
+#: Weights of pages in the search, by the beginning of their place.
 BOOSTS = {
     "tutorials/": 2.0,
     "how-to/": 2.0,
@@ -61,7 +66,7 @@ _why_not = ""
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add what is not in docs/."""
+    """Add pages from outside docs/."""
     for source, place in PAGES.items():
         text = (ROOT / source).read_text(encoding="utf-8")
         if source == "LICENSE":
@@ -83,12 +88,12 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Point links to the site's pages, and to the live page from where it is announced."""
+    """Point links to the site's pages and to the live page."""
     place = page.file.src_uri
     [boost] = [n for beginning, n in BOOSTS.items() if place.startswith(beginning)] or [1.0]
     page.meta["search"] = {"boost": boost}
     if place == "index.md":
-        # Nothing stands beside it in the tree.
+        # The home page has no neighbours in the navigation.
         page.meta["hide"] = ["navigation"]
     markdown = linked(markdown, place, files)
     up = posixpath.relpath(LIVE, posixpath.dirname(place) or ".")
@@ -103,26 +108,26 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Leave out the roles of names in docstrings."""
+    """Remove the roles of names in docstrings."""
     return _ROLE.sub("", content)
 
 
 def _with_plain_bars(row: re.Match[str]) -> str:
-    """A row of a table: GitHub needs a backslash before bars in its code, here it would show."""
+    """Row of a table without the backslashes that GitHub needs before bars in code."""
     return _CODE.sub(lambda code: code.group().replace(r"\|", "|"), row.group())
 
 
 def linked(text: str, place: str, files: Files) -> str:
-    """A page's text with its links as the site needs them.
+    """Text of a page with the links of the site.
 
     Args:
-        text: in Markdown.
-        place: of the page in the site. Its links start where its source is in the repository.
+        text: in Markdown, with links relative to its source in the repository.
+        place: of the page in the site.
         files: of the site.
 
     """
-    roots = [source for source, page in PAGES.items() if page == place]
-    folder = "" if roots else posixpath.dirname(f"docs/{place}")
+    [source] = [source for source, page in PAGES.items() if page == place] or [f"docs/{place}"]
+    folder = posixpath.dirname(source)
     here = posixpath.dirname(place) or "."
 
     def found(link: re.Match[str]) -> str:
@@ -144,12 +149,12 @@ def linked(text: str, place: str, files: Files) -> str:
 
 
 def page_of(name: str) -> str:
-    """The page that a file of docs/ becomes."""
+    """Page of a file of docs/."""
     return name.removesuffix(".ipynb") + ".md" if name.endswith(".ipynb") else name
 
 
 def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
-    """A notebook as a page, with what its cells print and draw; and its pictures by their names."""
+    """Run a notebook, and return it as a page with all output, and its pictures by name."""
     notebook = nbformat.read(path, as_version=4)  # type: ignore[no-untyped-call]
     with TemporaryDirectory() as folder:
         NotebookClient(notebook, resources={"metadata": {"path": folder}}).execute()
@@ -175,7 +180,7 @@ def run_notebook(path: Path) -> tuple[str, dict[str, bytes]]:
 
 
 def live_page() -> tuple[str, str]:
-    """The live page and, where it cannot be made, why, as HTML."""
+    """Return the live page and "", or a page with the reason why it is missing, and the reason."""
     try:
         return presets.live_page("fig4"), ""
     except InputError as error:
@@ -185,6 +190,6 @@ def live_page() -> tuple[str, str]:
 
 
 def _outside_code(change: Callable[[str], str], text: str) -> str:
-    """Change what stands outside fenced code."""
+    """Change the text outside fenced code."""
     parts = re.split(r"(^```.*?^```$)", text, flags=re.DOTALL | re.MULTILINE)
     return "".join(part if part.startswith("```") else change(part) for part in parts)
