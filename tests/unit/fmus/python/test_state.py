@@ -157,6 +157,63 @@ def test_no_changed_byte_of_a_state_is_overlooked(place, byte):
     assert driver.slave._get_fmu_state() == saved
 
 
+#: Values that stand for something else in a state.
+ODD = (
+    nan, inf, -inf, 1e308, -1e308, 1e-320, -0.0, 0, 1, -1, 2**31, 10**400, "", "bogus", "\ud800",
+    True, None, [], {}, [[]], [0.0], "stepping", "terminated", "instantiated", "initialising",
+)  # fmt: skip
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """The path of every value in a state."""
+    keys = (
+        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    )
+    return [
+        *([path] if path else []),
+        *(p for key in keys for p in places(value[key], (*path, key))),
+    ]
+
+
+@given(name=st.sampled_from(REPRESENTATIVES), data=st.data())
+def test_state_with_any_other_values_is_refused_whole_or_goes_on(name: str, data: st.DataObject):
+    """The checksum is taken as right: the values are all that speaks against it."""
+    driver = ClassInstance(name)
+    driver.excite(1)
+    driver.step()
+    before = driver.slave._get_fmu_state()
+    state = json.loads(json.dumps(before))
+    # Every part as often as any other, however large it is.
+    top = data.draw(st.sampled_from([*state]))
+    *path, last = data.draw(st.sampled_from([(top, *p) for p in [(), *places(state[top])]]))
+    part = state
+    for key in path:
+        part = part[key]
+    part[last] = data.draw(st.sampled_from(ODD))
+    driver.slave._set_fmu_state(state)
+    if driver.answers():
+        assert driver.answers() == [Fmi2Status.error]
+        assert driver.slave._get_fmu_state() == before
+    else:
+        driver.slave.do_step(state["time"], 0.02)
+        assert all(map(isfinite, driver.outputs()))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"start_time": 10**400},
+        {"mode": "initialising"},
+        {"mode": "instantiated", "state": None, "outputs": []},
+    ],
+)
+def test_state_that_was_taken_once_is_refused(driver, change):
+    driver.step()
+    saved = driver.slave._get_fmu_state()
+    driver.slave._set_fmu_state({**saved, **change})
+    assert driver.answers() == [Fmi2Status.error]
+
+
 def test_state_that_is_not_fit_for_bytes_says_so():
     driver = ClassInstance("AuvPlant")
     content = driver.slave._fmu_state_to_bytes({"generator": object()})
