@@ -23,23 +23,18 @@ NAME, FOLDER = "FirstOrderLag", "first_order_lag"
 #: What is in that folder.
 WRITTEN = {"component.py", "page.md"}
 
-#: The component that stays: the fuzzer needs the states of another one.
+#: The only other component in the copy.
 OTHER = "fmus.disturbance_generator.component"
-
-#: Files that the fuzzer reads.
-READ = ("tests/support", "tests/fuzz", "docs/reference/fmi-answers.md",
-        "docs/reference/fmi-answers.csv")  # fmt: skip
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
 
 def python(tree: Path, *arguments: str) -> str:
-    """Run Python in a tree, whose packages and tests come before all others; what it says."""
-    path = os.pathsep.join(map(str, (tree, tree / "tests")))
+    """Run Python in a tree whose packages come before all others, and return what it prints."""
     process = subprocess.run(
         [sys.executable, *arguments],
         cwd=tree,
-        env={**os.environ, "PYTHONPATH": path},
+        env={**os.environ, "PYTHONPATH": str(tree)},
         capture_output=True,
         text=True,
         check=False,
@@ -57,10 +52,6 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     shutil.copytree(ROOT / "fmus", tree / "fmus", ignore=ignored)
     # Both packages come from one folder, as in any installation.
     shutil.copytree(ROOT / "src/auv_fmu", tree / "auv_fmu", ignore=ignored)
-    for name in READ:
-        (tree / name).parent.mkdir(parents=True, exist_ok=True)
-        copied = shutil.copytree if (ROOT / name).is_dir() else shutil.copyfile
-        copied(ROOT / name, tree / name)
     shutil.copytree(Path(__file__).parent / FOLDER, tree / "fmus" / FOLDER, ignore=ignored)
     for kind in ("python", "native"):
         python(tree, "-m", "fmus.build", "--kind", kind, "--out", f"dist/{kind}")
@@ -119,10 +110,3 @@ def test_reference_is_written_for_it(tree: Path, tmp_path: Path):
     held, before = u["u"][:-1], x["x"][:-1]
     expected = held + (before - held) * np.exp(-STEP / 0.5)
     np.testing.assert_allclose(x["x"][1:], expected, rtol=1e-9)
-
-
-@pytest.mark.slow
-def test_fuzzer_attacks_it(tree: Path):
-    options = ("--fmus", "dist/python", "dist/native", "--only", NAME, "--runs", "50")
-    said = python(tree, "-m", "fuzz.sequences", *options)
-    assert f"{NAME}: 50 " in said

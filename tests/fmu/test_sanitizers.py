@@ -18,7 +18,7 @@ pytestmark = [
 ]
 
 #: Calls of a host that makes them at random, and how often it starts anew.
-CALLS, SEEDS = 5_000, range(2)
+CALLS, SEEDS = 20_000, range(2)
 
 
 def said_by(host: Path, *arguments: str) -> str:

@@ -1,7 +1,5 @@
 """Random components: what `check` passes can be built, and both kinds do the same.
 
-    PYTHONPATH=tests python -m fuzz.components --runs 100
-
 Each is a script made from a seed, with ports, state and noise of any types and any of the hooks.
 Every other one has a type exchanged, or another mistake. What is wrong is told with its line. What
 passes has valid descriptions, and both kinds take the same steps: parameters change during the run,
@@ -10,7 +8,6 @@ and from a state that is restored they go on as they did before.
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -362,8 +359,8 @@ def files_of(seed: int) -> Mapping[str, str]:
 # Trials
 
 
-def finding(seed: int) -> str:
-    """What is wrong with the component of a seed; empty: nothing."""
+def findings(seed: int) -> list[str]:
+    """List what is wrong with the component of a seed."""
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         files = files_of(seed)
@@ -371,7 +368,7 @@ def finding(seed: int) -> str:
             (folder / name).write_text(text, encoding="utf-8")
         (folder / "checked").mkdir()
         try:
-            return _finding(folder / f"random_{seed}.py", folder, seed)
+            return [*filter(None, [_finding(folder / f"random_{seed}.py", folder, seed)])]
         finally:
             sys.path.remove(str(folder.resolve()))
             for name in files:
@@ -455,26 +452,3 @@ def _value(variable: Variable, draw: Random) -> Any:
         "Boolean": draw.randint(0, 1),
         "String": draw.choice((b"low", b"high", b"middle")),
     }[variable.type]
-
-
-def main() -> int:
-    """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m fuzz.components", description=__doc__)
-    parser.add_argument("--runs", type=int, default=100, help="components (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the first component")
-    parser.add_argument("--show", action="store_true", help="print the component of the first seed")
-    options = parser.parse_args()
-    if options.show:
-        print(text_of(options.seed))
-        return 0
-    wrong = 0
-    for seed in range(options.seed, options.seed + options.runs):
-        if said := finding(seed):
-            wrong += 1
-            print(f"seed {seed}: {said:.500}", flush=True)
-    print(f"{options.runs} components, {wrong} with a finding")
-    return 1 if wrong else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,10 +1,5 @@
 """Attack the command line with files that are not what they should be.
 
-    export PYTHONPATH=tests
-    python -m fuzz.files --runs 1000                    all kinds of files, in turn
-    python -m fuzz.files --runs 10000 --only table      one kind
-    python -m fuzz.files --runs 1 --only ssd --seed 17  the one that a finding names
-
 A valid file of each kind is mutated (:mod:`.files_mutators`) and handed to a command. Whatever it
 has become, the command ends with 0, or with 2 and one line; no exception leaves it; it writes into
 the current and the temporary folder alone; and it is done within seconds and some hundred
@@ -14,7 +9,7 @@ its kind and seed alone.
 
 from __future__ import annotations
 
-import argparse
+import atexit
 import io
 import os
 import resource
@@ -24,9 +19,9 @@ import tempfile
 import traceback
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import chdir, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import ExitStack, chdir, contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from random import Random
 from shutil import which
@@ -371,36 +366,17 @@ def prepared() -> Iterator[dict[str, Kind]]:
             _process_folder.cache_clear()
 
 
-def main() -> int:
-    """Attack, and tell of what was found."""
-    parser = argparse.ArgumentParser(prog="python -m fuzz.files", description=__doc__)
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.add_argument("--runs", type=int, default=1000, help="of each kind; default: 1000")
-    parser.add_argument("--seed", type=int, default=0, help="of the first run; default: 0")
-    parser.add_argument("--only", metavar="KIND", help="one kind of file; default: all")
-    options = parser.parse_args()
-    with prepared() as found:
-        return _attacks(found, options)
+@cache
+def _kinds() -> dict[str, Kind]:
+    stack = ExitStack()
+    atexit.register(stack.close)
+    return stack.enter_context(prepared())
 
 
-def _attacks(found: Mapping[str, Kind], options: argparse.Namespace) -> int:
-    chosen = {options.only: found[options.only]} if options.only else found
-    findings = 0
-    for name, kind in chosen.items():
-        statuses = {0: 0, 2: 0}
-        seen: set[str] = set()
-        for seed in range(options.seed, options.seed + options.runs):
-            content = kind.mutate(kind.valid, Random(f"{name} {seed}"))
-            try:
-                statuses[attack(kind, content)] += 1
-            except Finding as finding:
-                findings += 1
-                if str(finding) not in seen:
-                    seen.add(str(finding))
-                    print(f"{name} {seed}: {finding}", flush=True)
-        print(f"{name}: {options.runs} files, {statuses[0]} taken, {statuses[2]} refused")
-    return 1 if findings else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def findings(seed: int) -> Iterator[str]:
+    """Attack the command line with a file of each kind."""
+    for name, kind in _kinds().items():
+        try:
+            attack(kind, kind.mutate(kind.valid, Random(f"{name} {seed}")))
+        except Finding as finding:
+            yield f"{name}: {finding}"

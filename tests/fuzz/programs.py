@@ -1,7 +1,5 @@
 """Random programs of the language of equations: in Python and in C they do the same.
 
-    PYTHONPATH=tests python -m fuzz.programs --runs 10000
-
 Each program is a function of a few numbers, made from a seed, that returns all of its variables. It
 is run in both languages with usual and with odd numbers. C may refuse an integer of more than 32
 bits where Python goes on; else both give the same bits, or both raise.
@@ -9,19 +7,14 @@ bits where Python goes on; else both give the same bits, or both raise.
 
 from __future__ import annotations
 
-import argparse
 import math
-import os
 import re
-import subprocess
-import sys
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from random import Random
 from typing import NamedTuple
 
-from support.hosts import sanitizers
 from support.language import HEAD, TOO_LARGE, Answer, Twins, module_of, sizes_of
 
 #: Programs in one module, and how often each is run.
@@ -628,34 +621,6 @@ def tried(seeds: Sequence[int], command: Sequence[str]) -> Iterator[Finding]:
                     break
 
 
-def main() -> int:
-    """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m fuzz.programs", description=__doc__)
-    parser.add_argument("--runs", type=int, default=1000, help="programs (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the first program")
-    parser.add_argument("--show", action="store_true", help="print the program of the first seed")
-    parser.add_argument("--compiler", default="cc -O2", help="command (default: %(default)s)")
-    parser.add_argument("--sanitize", action="store_true", help="compile with sanitizers")
-    options = parser.parse_args()
-    if options.show:
-        print(Program("program", options.seed).text())
-        return 0
-    if options.sanitize and "ASAN_OPTIONS" not in os.environ:
-        command = [sys.executable, "-m", "fuzz.programs", *sys.argv[1:]]
-        with sanitizers() as reports:
-            status = subprocess.run(command, check=False).returncode
-            print(reports, end="")
-        return status
-    compiler = ("gcc", *SANITIZED) if options.sanitize else options.compiler.split()
-    wrong, seeds = 0, range(options.seed, options.seed + options.runs)
-    for start in range(0, len(seeds), BATCH):
-        for finding in tried(seeds[start : start + BATCH], compiler):
-            wrong += 1
-            print(f"seed {finding.seed}: {[*finding.given]}")
-            print(f"  Python {finding.python}\n  C {finding.c}", flush=True)
-    print(f"{len(seeds)} programs, {wrong} of them differ")
-    return 1 if wrong else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def findings(seed: int) -> list[str]:
+    """Findings among a hundred programs."""
+    return [str(one) for one in tried(range(seed * BATCH, (seed + 1) * BATCH), ("cc", "-O2"))]

@@ -1,7 +1,5 @@
 """Random systems of random components: their programs do what their FMUs do, bit for bit.
 
-    PYTHONPATH=tests python -m fuzz.systems --runs 10
-
 A pool is some components, made from a seed and built once as FMUs of both kinds, and systems that
 are wired from them: at random, without rings of direct feedthroughs, with values that change on
 their way, steps of components, any order, and any start. Each runs with the FMUs of both kinds, and
@@ -11,13 +9,8 @@ in. Some components refuse: then so does the program, after as many steps.
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
-import subprocess
 import sys
-from base64 import b64decode
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -67,23 +60,17 @@ from orchestrator.cosim import (
     simulate_plan,
 )
 from orchestrator.cosim.system.connection import can_feed
-from orchestrator.live import module
-from orchestrator.live.module import MODULE
-from orchestrator.live.programs import OF_PROGRAM, Source
 from orchestrator.machine.compilers import compiler_for
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.platforms import platforms
 from orchestrator.program.writer import Equations, Text
-from support.programs import compiled, play, values_of
+from support.programs import compiled, play
 
 #: Components of a pool, and systems that are made of them.
 COMPONENTS, SYSTEMS = 6, 20
 
 #: Where the Python kind says that something was raised.
 _PLACE = re.compile(r"\S+\.py:\d+: ")
-
-#: Sine and its like, the same for every compiler.
-SAME_FUNCTIONS = Path(__file__).parents[1] / "support" / "same_functions.h"
 
 #: Numbers that stay small, mostly: a run should come to its end.
 CALM: Mapping[str, Sequence[str]] = {
@@ -470,101 +457,33 @@ def run_of_fmus(plan: Plan) -> Run:
 
 def run_of_program(text: Text, path: Path) -> Run:
     """A run of a program."""
-    found = play(text, path)
-    refused = found.refused if found.outcome else None
-    return _told(text, found.rows, found.has_begun, refused)
-
-
-def _told(text: Text, rows: np.ndarray, has_begun: bool, refused: tuple[int, int] | None) -> Run:
-    """What a program has come to, with the number of what refuses, and of steps before that."""
-    failure = ""
-    if refused is not None:
-        component, made = refused
-        at = f"stopped at t = {text.plan.experiment.time(made):.12g} s: " * has_begun
+    found, failure = play(text, path), ""
+    if found.outcome:
+        component, made = found.refused
+        at = f"stopped at t = {text.plan.experiment.time(made):.12g} s: " * found.has_begun
         failure = f"{at}{text.components[component]}"
     names = ("time", *map(str, text.columns))
-    return Run(dict(zip(names, rows.T, strict=True)), failure, has_begun)
+    return Run(dict(zip(names, found.rows.T, strict=True)), failure, found.has_begun)
 
 
 class Ways:
     """The ways in which programs are made of the components of a pool."""
 
-    def __init__(self, made: Sequence[Made], folder: Path, *options: object) -> None:
-        self._folder, self._options = folder, ("-DAPART=", *options)
+    def __init__(self, made: Sequence[Made], folder: Path) -> None:
+        self._folder = folder
         self._shared = Equations((one.definition for one in made), (), is_tuned=True)
-        self._object = compiled(self._shared.apart(), folder / "equations.o", *self._options, "-c")
+        self._object = compiled(self._shared.apart(), folder / "equations.o", "-DAPART=", "-c")
 
     def programs(self, of: Drawn, number: int) -> Iterator[tuple[str, Text, Path]]:
         """Programs of a system, each with the name of the way in which it was made."""
         plan, place = of.plan(NATIVE), self._folder / f"{number}"
         text = Text(plan, of.definitions, alters=True, shared=self._shared)
-        options = *self._options, self._object, "-shared"
+        options = "-DAPART=", self._object, "-shared"
         yield "alters", text, compiled(text.apart(), place.with_suffix(".a.so"), *options)
         is_quick = number % 2 == 1
         text = Text(plan, of.definitions, is_tuned=of.is_tuned, is_quick=is_quick)
         library = compiled(text.text(), place.with_suffix(".b.so"), "-shared")
         yield QUICK if text.is_quick else "careful", text, library
-
-
-# The page
-
-
-def runs_in_node(texts: Sequence[Text], folder: Path) -> list[Run]:
-    """Runs of programs as a module of the page, all of the same equations."""
-    sources = {"equations": Source(texts[0].equations.apart())}
-    sources |= {f"p{i}": Source(text.apart(), *OF_PROGRAM) for i, text in enumerate(texts)}
-    (folder / MODULE).write_bytes(module.compiled(sources)[MODULE])
-    given = [
-        {
-            "number": i,
-            "values": values_of(text),
-            "times": (of.start_time, of.step, of.stop_time),
-            "fullSteps": of.full_steps,
-            "steps": of.rows - 1,
-            "width": 1 + len(text.columns),
-        }
-        for i, text in enumerate(texts)
-        for of in [text.plan.experiment]
-    ]
-    script = Path(__file__).with_name("in_node.mjs")
-    process = subprocess.run(
-        ["node", script, folder / MODULE],
-        input=json.dumps(given),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return [
-        _told(
-            text,
-            np.frombuffer(b64decode(one["rows"])).reshape(-1, 1 + len(text.columns)),
-            one["hasBegun"],
-            None if one["isWhole"] else (one["component"], one["made"]),
-        )
-        for text, one in zip(texts, json.loads(process.stdout), strict=True)
-    ]
-
-
-def findings_in_node(seed: int, systems: int) -> list[str]:
-    """Where runs of a module of the page differ from those of the same programs here.
-
-    Both have the same sine and its like: C libraries differ in their last bits.
-    """
-    first = seed * COMPONENTS
-    with TemporaryDirectory() as temporary:
-        folder = Path(temporary)
-        try:
-            made = pool(range(first, first + COMPONENTS), folder)
-            ways = Ways(made, folder, "-include", SAME_FUNCTIONS)
-            numbers = range(seed * systems, (seed + 1) * systems)
-            found = [next(ways.programs(drawn(number, made), number)) for number in numbers]
-            pages = runs_in_node([text for _, text, _ in found], folder)
-        finally:
-            _forget(folder)
-        runs = (run_of_program(text, library) for _, text, library in found)
-        return [
-            said for run, page in zip(runs, pages, strict=True) if (said := difference(run, page))
-        ]
 
 
 # Findings
@@ -646,23 +565,6 @@ def difference(wanted: Run, found: Run, is_quick: bool = False) -> str:
     return f"{m} rows, not {n}" if m != n else ""
 
 
-def main() -> int:
-    """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m fuzz.systems", description=__doc__)
-    parser.add_argument("--runs", type=int, default=10, help="pools (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the first pool")
-    options = parser.parse_args()
-    ends, wrong = Counter[str](), 0
-    for seed in range(options.seed, options.seed + options.runs):
-        for one in outcomes(seed):
-            ends[one.end] += 1
-            wrong += bool(one.findings)
-            for said in one.findings:
-                print(f"seed {seed}, {one.system}: {said}", flush=True)
-    told = ", ".join(f"{n} {end}" for end, n in ends.items())
-    print(f"{ends.total()} systems ({told}), {wrong} of them differ")
-    return 1 if wrong else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def findings(seed: int) -> list[str]:
+    """List what differs in the systems of a pool."""
+    return [f"{one.system}: {line}" for one in outcomes(seed) for line in one.findings]

@@ -1,20 +1,18 @@
-"""Random programs of the language in CI: few of what `python -m fuzz.programs` tries."""
+"""Random programs of the language: a few of those that `python -m fuzz programs` tries."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
 from fuzz.programs import Program, same, tried
 from orchestrator.machine.compilers import machines_compiler
-from support.hosts import GCC
+from support.hosts import GCC, sanitizers
 from support.language import TOO_LARGE, Answer
 
-#: Seeds of CI: those of the night come after them.
 FEW = range(40)
 
 needs_compiler = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -28,19 +26,17 @@ def test_programs_do_the_same_in_both_languages():
 @pytest.mark.slow
 @pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 def test_sanitizers_find_nothing_in_them():
-    command = [
-        sys.executable,
-        "-m",
-        "fuzz.programs",
-        "--sanitize",
-        "--seed",
-        "2000",
-        "--runs",
-        "25",
-    ]
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])}
-    process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert process.stdout == "25 programs, 0 of them differ\n", process.stderr
+    script = f"""
+from fuzz.programs import SANITIZED, tried
+print([*tried(range(2000, 2025), ({GCC!r}, *SANITIZED))])
+"""
+    with sanitizers() as reports:
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        command = [sys.executable, "-c", script]
+        process = subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=False
+        )
+        assert process.stdout == "[]\n", f"{process.stderr}{reports}"
 
 
 def test_a_seed_is_a_program_and_one_that_differs_would_be_seen():

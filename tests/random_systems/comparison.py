@@ -116,6 +116,12 @@ def outcomes(seed: int) -> Iterator[Outcome]:
                 yield Outcome(seed, how, DIFFERS if why else EQUAL, why or "")
 
 
+def findings(seed: int) -> list[str]:
+    """List the runs of a system that are not as they must be."""
+    wrong = (one for one in outcomes(seed) if one.what not in (EQUAL, UNDECIDED))
+    return [f"{one.how}: {one.what}: {one.why}" for one in wrong]
+
+
 def difference(
     result: Result, rows: Sequence[dict[str, Any]], tolerance: float = TOLERANCE
 ) -> str | None:

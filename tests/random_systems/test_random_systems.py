@@ -1,4 +1,4 @@
-"""Random systems show what they must; `python tests/random_systems` runs thousands of them."""
+"""Random systems show what they must; `python -m fuzz random_systems` runs thousands of them."""
 
 from __future__ import annotations
 
