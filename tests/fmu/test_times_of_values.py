@@ -12,7 +12,7 @@ from auv_fmu.water.ocean_current import begin
 from auv_fmu.water.sea import Sea, regular_waves, water
 from fmus.kinds import KINDS
 from orchestrator.machine.compilers import machines_compiler
-from orchestrator.runs.own_components import build_own
+from support.own import built
 from support.raw import Host, Library, Status, initialised, instance
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -67,11 +67,10 @@ def outputs(state: State, inputs: Inputs, t: float) -> Outputs:
 U, Y, AT = 0, 1, 2
 
 
-def built(folder: Path, kind: str, name: str, text: str) -> Library:
+def library(folder: Path, kind: str, name: str, text: str) -> Library:
     script = folder / f"{name}_{kind}.py"
     script.write_text(text, encoding="utf-8")
-    fmu = build_own(script, folder / name, kind=kind)
-    return Library(Path(fmpy.extract(str(fmu), folder / f"{name}_unpacked")))
+    return Library(built(script, kind, folder / name))
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -81,12 +80,12 @@ def kind(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="module")
 def continuous(kind: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return built(tmp_path_factory.mktemp(kind), kind, "followed", SCRIPT)
+    return library(tmp_path_factory.mktemp(kind), kind, "followed", SCRIPT)
 
 
 @pytest.fixture(scope="module")
 def sampled(kind: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return built(tmp_path_factory.mktemp(kind), kind, "held", f"{SCRIPT}\n\nSAMPLED = True\n")
+    return library(tmp_path_factory.mktemp(kind), kind, "held", f"{SCRIPT}\n\nSAMPLED = True\n")
 
 
 def put(host: Host, u: float) -> None:

@@ -16,15 +16,11 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import fmpy
 from fmpy.validation import validate_fmu
 
 from fmus import check
-from fmus.native.packaging import NativeKind
-from fmus.python.packaging import PythonKind, best_loader
-from fmus.script import source_of_script
-from orchestrator.machine.compilers import compiler_for
-from orchestrator.machine.platforms import platforms
+from fmus.kinds import KINDS
+from support.own import built
 from support.raw import Host, Library, Variable, instance
 
 FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR, EMPTY = (
@@ -388,14 +384,7 @@ def _finding(script: Path, folder: Path, seed: int) -> str:
 
 def difference(script: Path, folder: Path, plan: Sequence[int]) -> str:
     """Where the two kinds of a component differ, with a random step for each number of a plan."""
-    here, traces = platforms("2", None), []
-    for kind in (
-        PythonKind(best_loader()),
-        NativeKind("2", here, compiler_for(here), lambda line: None),
-    ):
-        fmu = folder / f"{kind.name}.fmu"
-        kind.write(source_of_script(script), fmu)
-        traces.append(_trace(Library(Path(fmpy.extract(fmu, folder / kind.name))), plan))
+    traces = [_trace(Library(built(script, kind, folder / kind)), plan) for kind in KINDS]
     for place, (one, other) in enumerate(zip(*traces, strict=True)):
         if repr(one) != repr(other):
             return f"at {place}: Python {one}, C {other}"

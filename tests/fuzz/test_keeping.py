@@ -49,7 +49,7 @@ from support.runs import InThisProcess
 from support.tiers import slow
 
 #: Examples of each command; with the profile `attack` some hundred times as many.
-EXAMPLES = max(settings.default.max_examples // 10, 8)
+EXAMPLES = max(settings.default.max_examples // 10, 4)
 
 STUDIES = all(map(find_spec, ("pyarrow", "scipy")))
 

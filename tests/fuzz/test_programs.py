@@ -13,7 +13,7 @@ from orchestrator.machine.compilers import machines_compiler
 from support.hosts import GCC, sanitizers
 from support.language import TOO_LARGE, Answer
 
-FEW = range(40)
+FEW = range(15)
 
 needs_compiler = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 

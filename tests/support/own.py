@@ -1,4 +1,4 @@
-"""A component of one file, and variants of its text."""
+"""A component of one file, variants of its text, and FMUs of such files."""
 
 from __future__ import annotations
 
@@ -7,7 +7,15 @@ from importlib import import_module
 from pathlib import Path
 from types import ModuleType
 
+import fmpy
 import pytest
+
+from fmus.kinds import PYTHON
+from fmus.native.packaging import NativeKind
+from fmus.python.packaging import PythonKind, best_loader
+from fmus.script import source_of_script
+from orchestrator.machine.compilers import compiler_for
+from orchestrator.machine.platforms import platforms
 
 LAG = '''\
 """A first-order lag, T dx/dt = u - x, solved exactly.
@@ -92,3 +100,15 @@ def imported(
     patch.syspath_prepend(folder)
     patch.delitem(sys.modules, name, raising=False)
     return import_module(name)
+
+
+def built(script: Path, kind: str, folder: Path, fmi: str = "2") -> Path:
+    """Build the FMU of a script for this machine, and unpack it into a folder."""
+    fmu = folder.with_suffix(".fmu")
+    if kind == PYTHON:
+        PythonKind(best_loader()).write(source_of_script(script), fmu)
+    else:
+        here = platforms(fmi, None)
+        native = NativeKind(fmi, here, compiler_for(here), lambda line: None)
+        native.write(source_of_script(script), fmu)
+    return Path(fmpy.extract(str(fmu), folder))
