@@ -17,12 +17,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fmus.discovery import components, source_of
+from fmus.discovery import source_of
 from fmus.native.packaging import MAIN, sources
 from fmus.native.translator import _directives
 from fmus.ports.behaviour import NUMBER_FORMAT
 from fmus.python.component import LONGEST_MESSAGE
 from support.language import HEAD, Twins, module_of
+from support.settings import NAMES
 
 COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
 
@@ -290,13 +291,18 @@ def bits(numbers: list[float]) -> bytes:
 # Compiling
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize(
-    ("name", "version"), [*((name, "2") for name in components()), ("AuvPlant", "3")]
+    ("name", "version", "standard"),
+    [*((name, "2", "c99") for name in NAMES), ("AuvPlant", "3", "c99"), ("AuvPlant", "2", "gnu17")],
 )
-def test_sources_are_c99_without_a_warning(tmp_path: Path, name: str, version: str, compiler: str):
+def test_sources_have_no_warning(tmp_path: Path, name: str, version: str, standard: str):
     folder = written(tmp_path, name, version)
-    compile_in(folder, "-fsyntax-only", MAIN[version], compiler=compiler)
+    for compiler in COMPILERS:
+        options = f"-std={standard}", "-fsyntax-only"
+        compile_in(folder, *options, MAIN[version], compiler=compiler)
+        if compiler == "gcc":
+            strict = "-Wshadow=local", "-Wconversion", "-Wno-unused-function"
+            compile_in(folder, *options, *strict, "equations.c")
 
 
 LINKED = """
