@@ -84,16 +84,13 @@ def arriving(drawn: Drawn, wire: Wire, value: Any) -> Any:
     """A value at the end of a wire."""
     source = drawn.parts[wire.source[0]].fmu.named(wire.source[1])
     target = drawn.parts[wire.target[0]].fmu.named(wire.target[1])
-    unit = source.unit
-    for hop in wire.hops:
-        if hop.unit != unit:
-            a, b = UNITS[unit], UNITS[hop.unit]
-            value = (a.factor * value + a.offset - b.offset) / b.factor
-            unit = hop.unit
-        if hop.linear is not None:
-            value = hop.linear[0] * value + hop.linear[1]
-        if hop.mapped:
-            value = dict(hop.mapped).get(value, value)
+    if source.unit != target.unit:
+        a, b = UNITS[source.unit], UNITS[target.unit]
+        value = (a.factor * value + a.offset - b.offset) / b.factor
+    if wire.linear is not None:
+        value = wire.linear[0] * value + wire.linear[1]
+    if wire.mapped:
+        value = dict(wire.mapped).get(value, value)
     return typed(target, value)
 
 

@@ -141,30 +141,21 @@ class Fmu:
         return {leaf[1] for leaf in leaves(self.outputs[output]) if leaf[0] == "input"}
 
 
-class Hop(NamedTuple):
-    """What happens on the way to the next connector.
+@dataclass
+class Wire:
+    """A connection of a component's output with a component's input.
 
     Attributes:
-        connector: name of a connector of a system; empty: it is the target itself.
-        unit: of that connector; empty: none.
-        linear: factor and offset.
+        source, target: component and port.
+        linear: factor and offset, after the units are those of the target.
         mapped: pairs of values.
 
     """
 
-    connector: str = ""
-    unit: str = ""
-    linear: tuple[float, float] | None = None
-    mapped: tuple[tuple[Any, Any], ...] = ()
-
-
-@dataclass
-class Wire:
-    """A connection of a component's output with a component's input, through other connectors."""
-
     source: tuple[str, str]
     target: tuple[str, str]
-    hops: list[Hop] = field(default_factory=lambda: [Hop()])
+    linear: tuple[float, float] | None = None
+    mapped: tuple[tuple[Any, Any], ...] = ()
 
 
 @dataclass
@@ -172,7 +163,7 @@ class Part:
     """A component.
 
     Attributes:
-        name: of it; before a dot stands the system that it is in.
+        name: of it.
         fmu: that it is an instance of.
         values: of parameters and inputs that nothing feeds, as they are in the end.
         hidden: values that others win over.
@@ -185,10 +176,6 @@ class Part:
     values: dict[str, Any] = field(default_factory=dict)
     hidden: dict[str, Any] = field(default_factory=dict)
     every: int = 1
-
-    @property
-    def group(self) -> str:
-        return self.name.rpartition(".")[0]
 
 
 @dataclass
@@ -336,14 +323,7 @@ class _Draw:
         fmus: list[Fmu] = []
         names = [f"c{i}" for i in range(n)]
         random.shuffle(names)
-        groups = [""]
-        if not self.as_scenario and self.chance(0.4):
-            groups = ["", "s", "s.inner", "r"][: random.randint(2, 4)]
-        placed = sorted(
-            (f"{group}.{name}".lstrip(".") for name in names for group in [random.choice(groups)]),
-            key=lambda name: names.index(name.rpartition(".")[2]),
-        )
-        for name in _in_file_order(placed):
+        for name in names:
             if fmus and self.chance(0.15):
                 fmu = random.choice(fmus)
             else:
@@ -610,43 +590,28 @@ class _Draw:
                         part.hidden[variable.name] = self._value(variable)
 
     def _transform(self) -> None:
-        """Connectors of systems on the way, and transformations."""
+        """Transformations of connections."""
         share = 0.0 if self.as_scenario else self.random.choice((0.0, 0.2, 0.5))
-        for k, wire in enumerate(self.wires):
+        for wire in self.wires:
             source = self.parts[wire.source[0]].fmu.named(wire.source[1])
             target = self.parts[wire.target[0]].fmu.named(wire.target[1])
-            ups, downs = passed(wire.source[0], wire.target[0])
-            units = QUANTITIES[source.quantity].units if source.unit else ("",)
             inside = wire.source[0] in self.ringed and wire.target[0] in self.ringed
-            hops = []
-            for i in range(len(ups) + len(downs) + 1):
-                last = i == len(ups) + len(downs)
-                hop = Hop(
-                    "" if last else f"w{k}", target.unit if last else self.random.choice(units)
-                )
-                if self.chance(share if source.type == "Real" or not share else 0.5):
-                    hop = self._transformed(hop, source, target, inside, mapped=last)
-                hops.append(hop)
-            wire.hops = hops
+            if self.chance(share if source.type == "Real" or not share else 0.5):
+                self._transformed(wire, source, target, inside)
 
-    def _transformed(
-        self, hop: Hop, source: Variable, target: Variable, inside: bool, mapped: bool
-    ) -> Hop:
+    def _transformed(self, wire: Wire, source: Variable, target: Variable, inside: bool) -> None:
         random = self.random
         if source.kind == "Real" and target.kind == "Real":
             factor = self.signed(0.3, 0.95)
-            probe = Variable("", "", "Real", None, source.quantity, hop.unit)
-            one, zero = _scale(probe)
-            offset = one * self.signed(0.05, 0.2) + (1.0 - factor) * zero
-            return hop._replace(linear=(factor, offset))
-        if inside or not mapped or source.kind != target.kind:
-            return hop
-        if source.kind == "Boolean":
-            return hop._replace(mapped=((False, True), (True, random.choice((True, False)))))
-        if source.kind in _COUNTED:
+            one, zero = _scale(target)
+            wire.linear = factor, one * self.signed(0.05, 0.2) + (1.0 - factor) * zero
+        elif inside or source.kind != target.kind:
+            return
+        elif source.kind == "Boolean":
+            wire.mapped = ((False, True), (True, random.choice((True, False))))
+        elif source.kind in _COUNTED:
             keys = random.sample(range(1, 5), random.randint(1, 3))
-            return hop._replace(mapped=tuple((key, random.randint(1, 4)) for key in keys))
-        return hop
+            wire.mapped = tuple((key, random.randint(1, 4)) for key in keys)
 
 
 def _fits(output: Variable, variable: Variable, same_unit: bool) -> bool:
@@ -657,39 +622,6 @@ def _fits(output: Variable, variable: Variable, same_unit: bool) -> bool:
     if same_unit and output.unit != variable.unit:
         return False
     return output.kind == variable.kind and output.quantity == variable.quantity
-
-
-def passed(source: str, target: str) -> tuple[list[str], list[str]]:
-    """The systems that a connection leaves, and those that it enters, by their names."""
-    leaves, enters = _groups(source), _groups(target)
-    common = [group for group in leaves if group in enters]
-    return (
-        [group for group in reversed(leaves) if group not in common],
-        [group for group in enters if group not in common],
-    )
-
-
-def _groups(name: str) -> list[str]:
-    """The systems around a component below the top, the outermost first."""
-    words = name.split(".")[:-1]
-    return [".".join(words[: i + 1]) for i in range(len(words))]
-
-
-def _in_file_order(names: list[str]) -> list[str]:
-    """Names as they stand in a file that keeps what is in one system together."""
-    placed: dict[str, Any] = {}
-    for name in names:
-        inner = placed
-        for word in name.split("."):
-            inner = inner.setdefault(word, {})
-
-    def walk(inner: dict[str, Any], before: str) -> list[str]:
-        found = []
-        for word, more in inner.items():
-            found += walk(more, f"{before}{word}.") if more else [before + word]
-        return found
-
-    return walk(placed, "")
 
 
 def reached(
@@ -852,63 +784,36 @@ def _archive(drawn: Drawn, folder: Path, fmus: list[str]) -> Path:
     files: dict[str, str | Path] = {
         f"resources/{name}.fmu": folder / f"{name}.fmu" for name in fmus
     }
-    connections: dict[str, list[str]] = {}
-    connectors: dict[str, dict[str, str]] = {}
-    for wire in drawn.wires:
-        _connect(drawn, wire, connections, connectors, random)
-
-    def bound(part: Part) -> tuple[str, dict[str, str]]:
-        """Bindings of a component, and values that the system around it sets."""
-        if not part.values:
-            return "", {}
-        inner, outer = {}, {}
+    inner: list[str] = []
+    outer: dict[str, str] = {}
+    for part in drawn.parts.values():
+        own = {}
         for name, value in part.values.items():
             text = _parameter(part.fmu.named(name), value)
             if name in part.hidden:
-                inner[name] = _parameter(part.fmu.named(name), part.hidden[name])
-                outer[f"{part.name.rpartition('.')[2]}.{name}"] = text
+                own[name] = _parameter(part.fmu.named(name), part.hidden[name])
+                outer[f"{part.name}.{name}"] = text
             else:
-                inner[name] = text
-        if random.random() < 0.5:
-            return archives.binding(inner), outer
-        file = f"parameters/{part.name}.ssv"
-        files[file] = archives.parameter_set(inner)
-        return archives.binding(source=file), outer
-
-    def group(name: str) -> str:
-        own: dict[str, list[str]] = {}
-        outer: dict[str, str] = {}
-        for part in drawn.parts.values():
-            if part.group == name:
-                bindings, further = bound(part)
-                outer |= further
-                hint = ""
-                if part.every > 1:
-                    hint = _hint(part.every * drawn.step)
-                own[part.name] = [
-                    archives.component(
-                        part.name.rpartition(".")[2],
-                        f"resources/{part.fmu.name}.fmu",
-                        bindings,
-                        type="application/x-fmu-sharedlibrary",
-                    ).replace("</ssd:Component>", f"{hint}</ssd:Component>")
-                ]
-            elif not name or part.name.startswith(f"{name}."):
-                rest = part.name.removeprefix(f"{name}.") if name else part.name
-                below = f"{name}.{rest.split('.')[0]}".lstrip(".")
-                if below not in own:
-                    own[below] = [group(below)]
-        wires = connections.get(name, [])
-        random.shuffle(wires)
-        return archives.system(
-            "".join(text for texts in own.values() for text in texts),
-            "".join(wires),
-            "".join(connectors.get(name, {}).values()),
-            name=name.rpartition(".")[2] or "top",
-            bindings=archives.binding(outer) if outer else "",
+                own[name] = text
+        bindings = archives.binding(own) if own else ""
+        if own and random.random() < 0.5:
+            file = f"parameters/{part.name}.ssv"
+            files[file] = archives.parameter_set(own)
+            bindings = archives.binding(source=file)
+        hint = _hint(part.every * drawn.step) if part.every > 1 else ""
+        fmu = f"resources/{part.fmu.name}.fmu"
+        component = archives.component(
+            part.name, fmu, bindings, type="application/x-fmu-sharedlibrary"
         )
-
-    text = archives.described(group(""))
+        inner.append(component.replace("</ssd:Component>", f"{hint}</ssd:Component>"))
+    wires = [
+        archives.connection(*map(".".join, (wire.source, wire.target)), _inside(drawn, wire))
+        for wire in drawn.wires
+    ]
+    random.shuffle(wires)
+    bindings = archives.binding(outer) if outer else ""
+    system = archives.system("".join(inner), "".join(wires), "", name="top", bindings=bindings)
+    text = archives.described(system)
     # The units and items of these systems, in the place of those.
     items = "".join(
         f'<ssc:Item name="{name}" value="{i}"/>' for i, name in enumerate(ITEMS, start=1)
@@ -937,55 +842,19 @@ def _parameter(variable: Variable, value: Any) -> str:
     return f'{variable.type} value="{literal(value)}"'
 
 
-def _connect(
-    drawn: Drawn,
-    wire: Wire,
-    connections: dict[str, list[str]],
-    connectors: dict[str, dict[str, str]],
-    random: Random,
-) -> None:
-    """Write a connection, with the connectors of the systems that it passes."""
-    source = drawn.parts[wire.source[0]].fmu.named(wire.source[1])
-    target = drawn.parts[wire.target[0]].fmu.named(wire.target[1])
-    ups, downs = passed(wire.source[0], wire.target[0])
-    at = (wire.source[0], wire.source[1])
-    for hop, (kind, group) in zip(
-        wire.hops,
-        [*(("output", up) for up in ups), *(("input", down) for down in downs), ("", "")],
-        strict=True,
-    ):
-        to = (group, hop.connector) if kind else wire.target
-        if kind:
-            of = source.type
-            text = archives.connector(hop.connector, kind, hop.unit, of)
-            text = text.replace('name="Speed"', 'name="Level"')
-            connectors.setdefault(group, {})[hop.connector] = text
-        # The system that the connection is stated in is the one around both ends, or one end.
-        inside = group if kind == "output" else to[0].rpartition(".")[0]
-        ends = [_end(name, connector, inside) for name, connector in (at, to)]
-        connections.setdefault(inside, []).append(
-            archives.connection(*ends, _inside(hop, source, target))
-        )
-        at = to
-
-
-def _end(name: str, connector: str, inside: str) -> str:
-    """An end of a connection as the system sees it that the connection is stated in."""
-    if name == inside:
-        return connector
-    return f"{name.rpartition('.')[2]}.{connector}"
-
-
-def _inside(hop: Hop, source: Variable, target: Variable) -> str:
-    if hop.linear is not None:
-        factor, offset = hop.linear
+def _inside(drawn: Drawn, wire: Wire) -> str:
+    """The transformation of a connection."""
+    if wire.linear is not None:
+        factor, offset = wire.linear
         return f'<ssc:LinearTransformation factor="{factor!r}" offset="{offset!r}"/>'
-    if not hop.mapped:
+    if not wire.mapped:
         return ""
-    name = {"Integer": "Integer", "Boolean": "Boolean", "Enumeration": "Enumeration"}[source.kind]
+    name = drawn.parts[wire.source[0]].fmu.named(wire.source[1]).kind
 
     def word(value: Any) -> str:
         return ITEMS[value - 1] if name == "Enumeration" else literal(value)
 
-    pairs = "".join(f'<ssc:MapEntry source="{word(a)}" target="{word(b)}"/>' for a, b in hop.mapped)
+    pairs = "".join(
+        f'<ssc:MapEntry source="{word(a)}" target="{word(b)}"/>' for a, b in wire.mapped
+    )
     return f"<ssc:{name}MappingTransformation>{pairs}</ssc:{name}MappingTransformation>"
