@@ -26,15 +26,7 @@ from fmus.python.component import LONGEST_MESSAGE
 from fmus.python.packaging import build_script, loader_compiler
 from support.fmi3 import Fmi3Library
 from support.kinds import FIXTURES
-from support.raw import (
-    Host,
-    Library,
-    Message,
-    Status,
-    harmless,
-    initialised,
-    instance,
-)
+from support.raw import Host, Library, Message, Status, harmless, initialised, instance
 
 pytestmark = pytest.mark.skipif(loader_compiler() is None, reason="there is no C compiler")
 

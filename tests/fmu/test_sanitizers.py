@@ -12,10 +12,7 @@ from support.all_types import build
 from support.hosts import GCC, MEMORY, THREADS, arguments_of, sanitized, sanitized_host
 from support.settings import REPRESENTATIVES
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(GCC is None, reason="gcc is not installed"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(GCC is None, reason="gcc is not installed")]
 
 #: Calls of a host that makes them at random, and how often it starts anew.
 CALLS, SEEDS = 20_000, range(2)

@@ -14,7 +14,6 @@ from multiprocessing import Pool
 FUZZERS = {
     "components": "fuzz.components",
     "files": "fuzz.files",
-    "programs": "fuzz.programs",
     "systems": "fuzz.systems",
     "random_systems": "random_systems.comparison",
 }

@@ -81,11 +81,7 @@ def files_of(seed: int) -> Mapping[str, str]:
     text = Component(seed, CALM).text().replace("HELPER", "helping_calm")
     text = text.replace("from pathlib", "from math import sin, sqrt\nfrom pathlib", 1)
     text = text.replace("> 3.0:", "> 0.5:")  # what is calm is refused, too, now and then
-    return {
-        f"calm_{seed}.py": text,
-        "helping_calm.py": HELPER,
-        "table.txt": "0.25 -0.0 1.5\n",
-    }
+    return {f"calm_{seed}.py": text, "helping_calm.py": HELPER, "table.txt": "0.25 -0.0 1.5\n"}
 
 
 # Pools and systems

@@ -47,12 +47,7 @@ UNITS = {
     "m/s": Unit("m s"),
     "km/h": Unit("m s", 1.0 / 3.6),
 }
-_BASES = {
-    "kg": 'kg="1"',
-    "K": 'K="1"',
-    "rad": 'rad="1"',
-    "m s": 'm="1" s="-1"',
-}
+_BASES = {"kg": 'kg="1"', "K": 'K="1"', "rad": 'rad="1"', "m s": 'm="1" s="-1"'}
 QUANTITIES = {
     "mass": Quantity(("kg", "g", "t"), 0.0, 5.0),
     "temperature": Quantity(("K", "degC"), 280.0, 10.0),

@@ -288,9 +288,7 @@ _case("fmi2GetReal", "100,000 times the same")(
 
 
 def _bad(
-    case: str,
-    found: Callable[[Draw], list[Variable]],
-    value: Callable[[Variable, Random], float],
+    case: str, found: Callable[[Draw], list[Variable]], value: Callable[[Variable, Random], float]
 ) -> None:
     """Add a case of a Real port and a value that it does not take."""
 

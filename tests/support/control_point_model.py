@@ -240,13 +240,7 @@ def _forced_drift(model: ActuatedDynamics, force: Matrix, ell: float) -> Matrix:
 
 
 def chi_1(
-    vehicle: Vehicle,
-    theta: float,
-    psi: float,
-    w: Matrix,
-    dy_r: Matrix,
-    r_1: Matrix,
-    ell: float,
+    vehicle: Vehicle, theta: float, psi: float, w: Matrix, dy_r: Matrix, r_1: Matrix, ell: float
 ) -> Matrix:
     """chi_1 below (25), (3,) [N]: what (26) bounds.
 

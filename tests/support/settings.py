@@ -43,30 +43,25 @@ class Setting(NamedTuple):
 
 
 class Trials(NamedTuple):
-    """How a component is tried.
+    """Values that a component is tried with.
 
     Attributes:
-        spread: how far good values may lie from those at the start [share].
-        overflow: values with which a state or an output of a step leaves the range of numbers.
-        no_start: values that no state and outputs at the start time follow from.
-        wild: values with which others need not fit together any more.
+        overflow: a state or an output of a step leaves the range of numbers.
+        no_start: no state and outputs at the start time follow from them.
 
     """
 
-    spread: float = 0.5
     overflow: Setting | None = None
     no_start: Setting | None = None
-    wild: Mapping[str, Any] = {}
 
 
 @cache
 def trials_of(name: str) -> Trials:
-    """How a component is tried; one not in settings.toml, and an FMU of others, as any may be."""
+    """Values for a component from settings.toml; none for an FMU of others."""
     if name not in components():
         return Trials()
-    said: dict[str, Any] = tomllib.loads(SETTINGS.read_text()).get(name, {})
-    settings = {key: Setting(**said.pop(key)) for key in ("overflow", "no_start") if key in said}
-    return Trials(**said, **settings)
+    settings = tomllib.loads(SETTINGS.read_text()).get(name, {})
+    return Trials(**{key: Setting(**values) for key, values in settings.items()})
 
 
 @cache

@@ -94,14 +94,7 @@ OURS = {
         "n": 32,
         "seed": 1,
     },
-    "Current": {
-        "speed": 0.1,
-        "direction": 0.0,
-        "root": 7.0,
-        "mu": 0.005,
-        "sigma": 0.02,
-        "seed": 1,
-    },
+    "Current": {"speed": 0.1, "direction": 0.0, "root": 7.0, "mu": 0.005, "sigma": 0.02, "seed": 1},
     "Sea": {"depth": 50.0, "g": 9.81},
     "Stages": {
         "n": 1,
@@ -209,11 +202,7 @@ def test_defaults_are_the_papers_or_named_as_ours(name):
         for field, value in SETS[name]._field_defaults.items()
         if name_of(type(value)) not in SETS
     }
-    assert plain == {
-        **SECTION_4_1.get(name, {}),
-        **OURS.get(name, {}),
-        **REMUS_100.get(name, {}),
-    }
+    assert plain == {**SECTION_4_1.get(name, {}), **OURS.get(name, {}), **REMUS_100.get(name, {})}
 
 
 def nested(value):

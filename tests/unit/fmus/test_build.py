@@ -21,9 +21,7 @@ def test_every_source_is_part_of_the_fingerprint(tmp_path: Path, monkeypatch: py
         [folder] = package.__path__
         folders[package.__name__] = tmp_path / package.__name__
         shutil.copytree(
-            folder,
-            folders[package.__name__],
-            ignore=shutil.ignore_patterns("dist", "__pycache__"),
+            folder, folders[package.__name__], ignore=shutil.ignore_patterns("dist", "__pycache__")
         )
     monkeypatch.setattr(discovery, "package_folder", folders.__getitem__)
     fingerprints = {discovery.fingerprint(NATIVE)}

@@ -80,7 +80,7 @@ def test_a_module_that_cannot_be_imported_is_told(tmp_path, monkeypatch):
     write(tmp_path, ("from math import expm1", "import nothing_there\nfrom math import expm1"))
     monkeypatch.chdir(tmp_path)
     assert [line.split(";")[0] for line in mistakes("own_lag.py")[1]] == [
-        "own_lag.py:8: ModuleNotFoundError: No module named 'nothing_there'",
+        "own_lag.py:8: ModuleNotFoundError: No module named 'nothing_there'"
     ]
 
 

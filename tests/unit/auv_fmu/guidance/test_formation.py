@@ -61,11 +61,7 @@ def test_places_of_four(shape, places):
         assert found == pytest.approx((x, y, 0.0), abs=1e-12)
 
 
-@given(
-    st.sampled_from(SHAPES),
-    st.integers(2, 64),
-    st.floats(0.1, 100.0),
-)
+@given(st.sampled_from(SHAPES), st.integers(2, 64), st.floats(0.1, 100.0))
 def test_neighbours_are_the_spacing_apart_and_nobody_is_nearer(shape, vehicles, spacing):
     stages = Stages()._replace(shape=(shape,) * 4, spacing=(spacing,) * 4)
     places = [

@@ -97,9 +97,7 @@ def test_reference_is_twice_continuously_differentiable(drawn):
 
 
 @given(timed())
-def test_reference_is_never_faster_than_its_fastest_leg_nor_outside_of_its_waypoints(
-    drawn,
-):
+def test_reference_is_never_faster_than_its_fastest_leg_nor_outside_of_its_waypoints(drawn):
     waypoints, t = drawn
     y_d, dy_d, _ = at(waypoints, t)
     legs = [path_planner.velocity(waypoints, k) for k in range(1, waypoints.n)]

@@ -360,14 +360,7 @@ def test_forces_of_accelerating_water_are_those_of_morison_and_kirchhoff(mass):
         dflow = np.concatenate((matrix.T @ dwater + turning.T @ water, np.zeros(3)))
         nu_r = nu - flow
         righting = np.array(
-            (
-                0,
-                0,
-                0,
-                ROLL.righting_roll * matrix[2, 1],
-                -VEHICLE.righting_pitch * matrix[2, 0],
-                0,
-            )
+            (0, 0, 0, ROLL.righting_roll * matrix[2, 1], -VEHICLE.righting_pitch * matrix[2, 0], 0)
         )
         froude_krylov = np.concatenate((mass * (matrix.T @ dwater), np.zeros(3)))
         # The rotational inertia stands in `added` as a whole: there nothing depends on the split.

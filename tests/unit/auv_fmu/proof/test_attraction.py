@@ -19,8 +19,7 @@ DAMPED, QUICK = Vehicle(d11=500.0, d55=200.0, d66=200.0), Gains(lambda_=2.1)
 positive, units = st.floats(0.1, 100.0), st.floats(0.01, 2.0)
 three = vectors(speeds, 3)
 gains = st.builds(
-    lambda k_1, k_2, lambda_, k_d: Gains((k_1,) * 3, (k_2,) * 3, lambda_, k_d),
-    *[positive] * 4,
+    lambda k_1, k_2, lambda_, k_d: Gains((k_1,) * 3, (k_2,) * 3, lambda_, k_d), *[positive] * 4
 )
 
 

@@ -87,8 +87,7 @@ def record(sea, hours, step):
 
 
 @pytest.mark.parametrize(
-    ("spectrum", "records"),
-    [(JONSWAP, 1), *slow((JONSWAP, 12), (PIERSON_MOSKOWITZ, 12))],
+    ("spectrum", "records"), [(JONSWAP, 1), *slow((JONSWAP, 12), (PIERSON_MOSKOWITZ, 12))]
 )
 def test_spectrum_of_records_of_three_hours_is_the_analytic_one(spectrum, records):
     """Energies of ten bands, from periodograms with a window of Hann.

@@ -29,11 +29,7 @@ from support.language import HEAD, TOO_LARGE, Twins, c_text, module_of, sizes_of
 ZIG = (sys.executable, "-m", "ziglang", "cc")
 
 #: Compilers, as FMUs are compiled by them.
-COMMANDS = {
-    "gcc": ("gcc", "-O2"),
-    "clang": ("clang", "-O2"),
-    "zig": (*ZIG, "-O2"),
-}
+COMMANDS = {"gcc": ("gcc", "-O2"), "clang": ("clang", "-O2"), "zig": (*ZIG, "-O2")}
 
 #: One that is there.
 COMPILED = next((name for name in ("gcc", "clang") if shutil.which(name)), "")

@@ -95,11 +95,7 @@ def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):
         "Program(begin).check()"
     )
     process = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert why in process.stderr.splitlines()[-1]
 

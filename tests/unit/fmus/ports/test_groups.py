@@ -12,15 +12,7 @@ import pytest
 from auv_fmu import Matrix, Variable, Vector
 from auv_fmu.language.quantities import NU, POSITION, TAU, per_axis
 from fmus.ports.fields import declared
-from fmus.ports.groups import (
-    SCOPE,
-    Nothing,
-    ParameterSet,
-    hints_of,
-    packed,
-    slices,
-    unpacking,
-)
+from fmus.ports.groups import SCOPE, Nothing, ParameterSet, hints_of, packed, slices, unpacking
 from fmus.ports.port import Port
 
 Vector3 = tuple[float, float, float]
