@@ -60,7 +60,7 @@ def test_fmu_is_valid(dist3: Path, name: str):
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_alone_it_does_what_the_python_kind_does(dist: Path, dist3: Path, name: str):
+def test_fmpy_gets_the_rows_of_the_python_kind(dist: Path, dist3: Path, name: str):
     ours, theirs = (
         fmpy.simulate_fmu(str(folder / f"{name}.fmu"), stop_time=5.0, output_interval=H)
         for folder in (dist, dist3)
@@ -72,7 +72,7 @@ def test_alone_it_does_what_the_python_kind_does(dist: Path, dist3: Path, name: 
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cmake") is None, reason="cmake is not installed")
-def test_sources_alone_give_the_same_rows(dist3: Path, tmp_path: Path):
+def test_sources_give_the_same_rows(dist3: Path, tmp_path: Path):
     fmpy.extract(dist3 / "AuvPlant.fmu", unzipdir=tmp_path / "fmu")
     shutil.rmtree(tmp_path / "fmu" / "binaries")
     (tmp_path / "build").mkdir()
@@ -136,7 +136,7 @@ def entered(host: Host, start: float, has_stop: bool = False, stop: float = 0.0)
 
 
 def answer(host: Host, status: Status) -> str:
-    """What a call was answered with, from all that can be seen of it."""
+    """The answer to a call, from its status, the messages and the next step."""
     said = [message.status for message in host.messages]
     assert not host.fault()
     assert said == ([] if status == Status.OK else [Status.Error])
@@ -159,7 +159,7 @@ CALLS: dict[tuple[str, str], Callable[[Host], Status]] = {
     ),
 }
 
-#: What comes in FMI 3.0 between the first arguments of an instance and its logger, and after it.
+#: Arguments of FMI 3.0 between the first ones of an instance and its logger, and after it.
 CREATIONS = {
     ("fmi3InstantiateCoSimulation", case): (
         (c_bool(event_mode), c_bool(True), (c_uint * 1)(1), c_size_t(1), None), (None,)
@@ -205,7 +205,7 @@ def test_own_creation(plant: Fmi3Library, key: tuple[str, str]):
 
 @pytest.mark.parametrize("key", EXPERIMENTS, ids=": ".join)
 def test_own_experiment(plant: Fmi3Library, key: tuple[str, str]):
-    """Answered so, and what the FMU goes on with."""
+    """The answer is as in the table, and so is the run after it."""
     for start, has_stop, stop in EXPERIMENTS[key]:
         with instance(plant) as host:
             status = entered(host, start, has_stop, stop)
@@ -280,7 +280,7 @@ def test_version(plant: Fmi3Library):
 
 
 @pytest.mark.parametrize("target", ["NULL", "freed", "something else"])
-def test_what_is_no_instance_is_told_from_what_is(plant: Fmi3Library, target: str):
+def test_pointers_to_other_things_are_not_taken_for_instances(plant: Fmi3Library, target: str):
     memory = (c_double * 64)()
     with instance(plant) as gone:
         handle = {"NULL": None, "freed": gone.component, "something else": addressof(memory)}[
@@ -298,7 +298,7 @@ def test_what_is_no_instance_is_told_from_what_is(plant: Fmi3Library, target: st
         assert witness.content() == before
 
 
-# What FMI 3.0 has and FMI 2.0 has not
+# Parts of FMI 3.0 that FMI 2.0 lacks
 
 
 def test_time_is_a_variable(plant: Fmi3Library):
@@ -363,7 +363,7 @@ def test_categories_are_turned_on_and_off_one_by_one(unpacked: Path):
         assert heard(host) == [warning, discard, error]
 
 
-def test_messages_are_no_formats_and_name_no_variables(plant: Fmi3Library):
+def test_messages_are_neither_formats_nor_names_of_variables(plant: Fmi3Library):
     host = Host(plant)
     assert not host.instantiate(guid=b"50%#1#")
     [message] = host.messages

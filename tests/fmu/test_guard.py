@@ -1,6 +1,6 @@
-"""What no slave can be told: wrong pointers, dead handles, text that is none, FMUs without a slave.
+"""Calls that no slave can answer: wrong pointers, dead handles, invalid text, FMUs without a slave.
 
-None of it may end the host. Each test is one class of mistakes beside those of fmi-answers.md, on
+No such call may end the host. Each test is one class of mistakes that fmi-answers.md lacks, on
 one small FMU of each kind: the guard is the loader's or the runtime's, and the same for all FMUs.
 """
 
@@ -63,7 +63,7 @@ def library(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 @pytest.fixture(scope="module")
 def planner(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """Of the same kind."""
+    """Another FMU of the same kind."""
     return Library(unpacked(fmus, tmp_path_factory, "MotionPlanner"))
 
 
@@ -98,7 +98,7 @@ def in_error(host: Host) -> None:
 
 
 def refused(library: Library, **arguments: Any) -> Message:
-    """What is said, with logging off, where there is no instance."""
+    """The only message, with logging off, of a call that gives no instance."""
     host = Host(library)
     before = list(sys.path)
     assert not host.instantiate(**arguments, logging=False)
@@ -123,7 +123,7 @@ def test_place_without_a_slave_is_null_with_one_message(python, what, location):
     assert (message.status, message.category) == (ERROR, "logStatusError")
 
 
-def test_guid_is_that_of_the_description_or_not_stated(of_any_version: Library):
+def test_guid_is_in_the_description_or_not_stated(of_any_version: Library):
     stated = of_any_version.description.guid.encode()
     bare = stated.strip(b"{}")
     for guid in (None, b"", stated, bare, stated.upper(), bare.upper(), bare.lower()):
@@ -199,8 +199,8 @@ def test_long_reason_is_cut_between_characters(python, resources):
     "name", ["slavemodule.txt", "guid.txt", "{script}.py", "__pycache__/{script}.{tag}.pyc"]
 )
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
-def test_resource_that_is_no_file_is_not_waited_for(python, resources, name: str, kind: str):
-    """A pipe would be read from for ever, and so would the device."""
+def test_resources_other_than_files_are_refused_at_once(python, resources, name: str, kind: str):
+    """Reading a pipe or the device would not end."""
     path = resources / name.format(script=script_of(resources), tag=sys.implementation.cache_tag)
     path.parent.mkdir(exist_ok=True)
     path.unlink(missing_ok=True)
@@ -236,7 +236,7 @@ ARRAYS = {"Real": (c_double * 2)(), "Integer": (c_int * 2)(), "Boolean": (c_int 
           "String": STRINGS}  # fmt: skip
 TOO_MANY = c_size_t(2**31)
 
-#: Function, and arguments that cannot be forwarded, beside those of docs/reference/fmi-answers.md.
+#: Function, and arguments that cannot be forwarded; docs/reference/fmi-answers.md has others.
 WRONG = [
     *(
         (f"{verb}{kind}", (ONE, n, values))
@@ -260,7 +260,7 @@ def test_wrong_argument_is_an_error_with_one_message(host: Host, function, argum
     assert (message.status, message.category) == (ERROR, "logStatusError")
 
 
-#: What is refused of an FMU that is initialised, and the answer.
+#: Refused calls on an FMU that is initialised, each with its answer.
 REFUSED = [
     *(
         (Status.Discard, lambda host, name=name, value=value: put(host, name, value))
@@ -335,7 +335,7 @@ def test_of_several_values_all_are_taken_or_none(
     assert len(host.messages) == (answer != OK)
 
 
-# What is not alive
+# Dead handles
 
 
 def test_no_function_touches_what_is_not_alive(library: Library, capfd):

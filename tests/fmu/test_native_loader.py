@@ -1,4 +1,4 @@
-"""The FMUs in a host that is no Python program, with an empty environment."""
+"""The FMUs in a host written in C, with an empty environment."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def test_all_fmus_run_side_by_side_in_a_c_host(dist: Path, tmp_path: Path, with_
 
 @needs_libpython
 def test_host_that_ends_python_first_lets_its_instances_go_in_silence(dist, tmp_path):
-    """All else is an error that says what has happened."""
+    """Every other call is an error with the reason."""
     program = host(tmp_path, "ending")
     process = run(program, str(LIBPYTHON), *unpacked(dist, tmp_path, NAMES[:1]))
     assert process.returncode == 0, process.stderr
@@ -91,13 +91,13 @@ def test_host_that_ends_python_first_lets_its_instances_go_in_silence(dist, tmp_
 
 
 @needs_libpython
-def test_path_with_special_characters_is_no_trap(dist: Path, tmp_path: Path, with_libpython: Path):
+def test_paths_may_have_special_characters(dist: Path, tmp_path: Path, with_libpython: Path):
     folder = tmp_path / "größe 100% [ü]"
     process = run(with_libpython, *unpacked(dist, folder, NAMES[:1]))
     assert process.returncode == 0, process.stdout
 
 
-#: Makes every libpython unfindable, as on a machine that has none.
+#: Makes every libpython unfindable, as on a machine without one.
 NO_LIBPYTHON = """
 #include <dlfcn.h>
 #include <string.h>
@@ -140,7 +140,7 @@ def test_libpython_without_its_standard_library_does_not_end_the_host(dist, tmp_
 @needs_libpython
 @pytest.mark.parametrize("count", [2, *slow(16)])
 def test_threads_that_instantiate_at_the_same_moment(dist: Path, tmp_path: Path, count: int):
-    """One interpreter starts, whoever comes first, and all go by the same sys.path."""
+    """One interpreter starts, and all instances use the same sys.path."""
     program = host(tmp_path, "threads", *FINDS_LIBPYTHON)
     arguments = [word for k in range(3) for word in unpacked(dist, tmp_path / str(k))][: 2 * count]
     for resources in tmp_path.glob("*/*/resources"):
@@ -165,7 +165,7 @@ def test_no_variable_keeps_python_from_starting(dist, tmp_path, with_libpython):
     assert process.returncode == 0, process.stdout + process.stderr
 
 
-#: A libpython that the host has for itself alone, and a watch over what must not be nested: the
+#: A libpython that only the host has, and a check of calls that must not be nested: the
 #: dynamic linker holds one lock while it goes through the libraries, another while it loads one.
 PRIVATE_PYTHON = """
 #include <dlfcn.h>
@@ -206,7 +206,7 @@ def test_python_that_a_host_has_for_itself_is_used(dist: Path, tmp_path: Path):
     assert process.returncode == 0, process.stdout
 
 
-#: A slave of somebody else that says what it does.
+#: A third-party slave that prints in each step.
 TALKATIVE = """
 from pythonfmu import Fmi2Slave
 

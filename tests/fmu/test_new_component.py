@@ -20,7 +20,7 @@ from reference import STEP, STOP_TIME, write_component_reference
 ROOT = Path(__file__).parents[2]
 NAME, FOLDER = "FirstOrderLag", "first_order_lag"
 
-#: What is in that folder.
+#: Files in that folder.
 WRITTEN = {"component.py", "page.md"}
 
 #: The only other component in the copy.
@@ -59,7 +59,7 @@ def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tree
 
 
-def test_folder_is_all_that_is_written(tree: Path):
+def test_folder_has_no_other_files(tree: Path):
     assert {path.name for path in (tree / "fmus" / FOLDER).glob("*.*")} == WRITTEN
 
 
@@ -80,7 +80,7 @@ def test_page_has_the_ports(tree: Path):
 
 
 def test_both_kinds_give_the_same_numbers_and_they_are_right(tree: Path):
-    """Of the exponential, and of the noise: 3,000 numbers deviate by 1 cm, give or take 5 %."""
+    """The exponential, and the noise: 3,000 numbers with a deviation of 1 cm, up to 5 %."""
     one, other = (
         fmpy.simulate_fmu(
             str(tree / f"dist/{kind}/{NAME}.fmu"), stop_time=30.0, step_size=0.01,

@@ -1,4 +1,4 @@
-"""A component whose noise may be refused: such a step takes nothing of the noise, in both kinds."""
+"""A step whose noise is refused draws nothing from the generator, in both kinds."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What hosts make of a refusal: none ends the run as a success, and a reset leaves nothing."""
+"""Refusals in hosts: none ends the run as a success, and a reset leaves no trace."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class Refused(NamedTuple):
     why: str = ""
 
 
-#: By what is refused.
+#: Runs by the reason of the refusal.
 REFUSALS = {
     "an exception of the equations": Refused(
         "MotionPlanner", {"tau_d.q": 8.0}, step=0.5, steps=20, why="pitch"
@@ -92,9 +92,9 @@ def test_fmpy_does_not_end_the_run_as_a_success(fmu, kind: str, case: str):
             step_size=refused.step,
             output_interval=refused.step,
             stop_time=refused.steps * refused.step,
-            debug_logging=True,  # what is discarded is no error
+            debug_logging=True,  # else only errors are logged
             logger=lambda *arguments: heard.append(arguments[-1].decode()),
-            # fmpy repeats a discarded step for ever, if the FMU lets it.
+            # fmpy repeats a discarded step without end if the FMU lets it.
             timeout=60.0,
         )
     assert refused.why in heard[-1]
@@ -112,7 +112,7 @@ def test_our_master_fails_with_the_reason(fmu, kind: str, case: str):
             step=refused.step,
         )
     except ValueError as error:
-        said = str(error)  # of what it knows not to be a value
+        said = str(error)  # refused before the run
     else:
         said = result.failure or ""
     assert refused.why in said

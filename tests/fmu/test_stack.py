@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no
 
 TESTS = Path(__file__).parents[1]
 
-#: All that a host does with an instance, on a thread with that stack.
+#: Every use that a host makes of an instance, on a thread with that stack.
 _DRIVE = """\
 import sys, threading
 from pathlib import Path
@@ -228,7 +228,7 @@ def drive(folder: Path, version: str = "2") -> None:
     assert process.returncode == 0, process.stderr[-2000:]
 
 
-#: What stands for the others in quick tests.
+#: Cases of the quick tests.
 QUICK = ("a state that is not credible",)
 
 

@@ -51,7 +51,7 @@ KEYS = {
     ],
 }
 
-#: Functions that PythonFMU's own library has a part in, and no guard of ours.
+#: Functions that PythonFMU's own library answers in part, without a guard.
 UNGUARDED = (
     "fmi2FreeFMUstate",
     "fmi2GetBooleanStatus",

@@ -107,7 +107,7 @@ def test_outputs_follow_inputs_at_once(continuous: Library):
         assert seen(host) == (Status.OK, [3.5, 0.5])
 
 
-def test_sampled_outputs_are_those_of_the_last_step_until_inputs_come(sampled: Library):
+def test_sampled_outputs_are_held_until_inputs_come(sampled: Library):
     with initialised(sampled) as host:
         put(host, 3.0)
         assert host.step(0.0, 0.5) == Status.OK
@@ -160,8 +160,8 @@ def test_restored_instance_holds_its_sample(sampled: Library, serialised: bool):
         assert seen(host) == (Status.OK, [4.0, 0.5])
 
 
-def test_time_is_that_of_a_host_that_counts_its_steps(continuous: Library):
-    """And after a jump, that of one that adds them up."""
+def test_time_is_the_time_of_a_host_that_counts_its_steps(continuous: Library):
+    """After a jump, the time is the sum of the steps."""
     start, h = 0.3, 0.1
     with instance(continuous) as host:
         assert host.setup(start) == host.enter() == host.exit() == Status.OK
@@ -175,7 +175,7 @@ def test_time_is_that_of_a_host_that_counts_its_steps(continuous: Library):
 
 @pytest.mark.parametrize("bundle", ["dist", "native", "dist3"])
 def test_a_long_step_of_the_sea_ends_with_the_elevation_of_its_end(request, bundle: str):
-    """A tool that steps the FMU alone, once a second, shows at t what holds at t."""
+    """A tool that steps only this FMU, once a second, shows at t the value at t."""
     fmu = request.getfixturevalue(bundle) / "Sea.fmu"
     table = fmpy.simulate_fmu(
         str(fmu), stop_time=20.0, step_size=1.0, output_interval=1.0, output=["elevation"]

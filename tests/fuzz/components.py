@@ -1,9 +1,9 @@
-"""Random components: what `check` passes can be built, and both kinds do the same.
+"""Random components: if `check` passes one, it can be built, and both kinds do the same.
 
 Each is a script made from a seed, with ports, state and noise of any types and any of the hooks.
-Every other one has a type exchanged, or another mistake. What is wrong is told with its line. What
-passes has valid descriptions, and both kinds take the same steps: parameters change during the run,
-and from a state that is restored they go on as they did before.
+Every other one has a type exchanged, or another mistake, which is reported with its line. A script
+that passes has valid descriptions, and both kinds take the same steps: parameters change during
+the run, and from a restored state they continue as before it.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR, EMPTY = (
     "tuple[int, int]", "tuple[float, float]", "tuple[bool, bool]", "Pair", "Empty",
 )  # fmt: skip
 
-#: How a value of each type is made of values of the types of its parts, and how these are read.
+#: Template of a value of each type, and the accessors of its parts with their types.
 PARTS: Mapping[str, tuple[str, Sequence[tuple[str, str]]]] = {
     V3: ("Vector(({}, {}, {}))", [(f"[{i}]", FLOAT) for i in range(3)]),
     M22: (
@@ -43,7 +43,7 @@ PARTS: Mapping[str, tuple[str, Sequence[tuple[str, str]]]] = {
 }
 TYPES = (FLOAT, INT, BOOL, MODE, *PARTS)
 
-#: What a number is made of others by.
+#: Expressions of each type.
 RULES: Mapping[str, Sequence[str]] = {
     FLOAT: (
         "0.5 * {f} - 0.25 * {f}",
@@ -66,7 +66,7 @@ RULES: Mapping[str, Sequence[str]] = {
 LETTERS = {"f": FLOAT, "i": INT, "b": BOOL, "m": MODE}
 CONSTANTS = {FLOAT: ("-0.0", "1.25"), INT: ("0", "-3"), BOOL: ("True",), MODE: ("Mode.OFF",)}
 
-#: Types of what `measured` draws, and how their numbers are read.
+#: Types of the draws of `measured`, and the accessors of their numbers.
 DRAWS = {
     FLOAT: ("n",),
     FF: ("n[0]", "n[1]"),
@@ -81,22 +81,22 @@ _TYPE = re.compile(
     r"(?=[,\]):]| =)"
 )
 
-#: Where a mistake is, or where something was raised.
+#: File and line of a mistake or an exception.
 _PLACE = re.compile(r"\S+\.py:\d+: ")
 
-#: What stands in descriptions.
+#: Descriptions.
 ABOUT = ("", "Plain", 'ü \\" \\\\ <&> 100 % {t:g} ??/ */', "'")
 
-#: What may be logged at a restart.
+#: Messages of a restart.
 MESSAGES = ("again at {t:g} s", "100 % at {t}", "{{t}} is {t:.3f} %d", "ü without a time")
 
 #: Names of fields that C or the runtime has, too.
 NAMES = ("double", "error", "state", "llabs", "math_errhandling", "x_u0302", "self", "made")
 
-#: Modules of ours and functions in them that are outside the language: the user's own are not.
+#: Modules of the bundle with functions outside the language; a user's own may have these names.
 HELPERS = (("plant", "white_noise"), ("euler", "internal_steps"), ("closed_loop", "closed_loop"))
 
-#: What is refused, or means the same in both kinds.
+#: Changes that are refused, or mean the same in both kinds.
 MISTAKES = (
     ("HIGH = 7", "HIGH = 2147483648"),
     ("HIGH = 7", "HIGH = 4294967303"),
@@ -170,7 +170,7 @@ if __name__ == "__main__":
     print(*(line for line in _shown()))
 '''
 
-#: What lies beside it.
+#: A module in the same folder.
 HELPER = """\
 def white_noise(x: float, limit: float = 2.0) -> float:
     assert x < 59.0, f"{x:g} is too large"
@@ -180,7 +180,7 @@ def white_noise(x: float, limit: float = 2.0) -> float:
         x = x * 0.5
 """
 
-#: What a hook returns, and the types of what it may take.
+#: Results of hooks, and types of their arguments.
 RETURNS = {"start": "State", "update": "State", "derive": "Derived", "outputs": "Outputs"}
 TAKEN = {
     "parameters": "Parameters", "inputs": "Inputs", "state": "State", "derived": "Derived",
@@ -356,7 +356,7 @@ def files_of(seed: int) -> Mapping[str, str]:
 
 
 def findings(seed: int) -> list[str]:
-    """List what is wrong with the component of a seed."""
+    """List the problems of the component of a seed."""
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         files = files_of(seed)
@@ -383,7 +383,7 @@ def _finding(script: Path, folder: Path, seed: int) -> str:
 
 
 def difference(script: Path, folder: Path, plan: Sequence[int]) -> str:
-    """Where the two kinds of a component differ, with a random step for each number of a plan."""
+    """The first difference of the two kinds, with a random step for each number of a plan."""
     traces = [_trace(Library(built(script, kind, folder / kind)), plan) for kind in KINDS]
     for place, (one, other) in enumerate(zip(*traces, strict=True)):
         if repr(one) != repr(other):

@@ -1,8 +1,8 @@
 """Attack the command line with files that are not what they should be.
 
 A valid file of each kind is mutated (:mod:`.files_mutators`) and handed to a command. Whatever it
-has become, the command ends with 0, or with 2 and one line; no exception leaves it; it writes into
-the current and the temporary folder alone; and it is done within seconds and some hundred
+has become, the command ends with 0, or with 2 and one line; no exception leaves it; it writes only
+into the current and the temporary folder; and it is done within seconds and some hundred
 megabytes.
 """
 
@@ -43,7 +43,7 @@ from support import typed
 
 from . import files_mutators as mutators
 
-#: What a command may take: seconds, bytes of memory more than there were, and letters to explain.
+#: Limits of a command: seconds, bytes of additional memory, and letters of its message.
 SECONDS, BYTES, LETTERS = 20, 2 * 2**30, 5000
 
 
@@ -52,11 +52,11 @@ class Finding(AssertionError):
 
 
 class Overdue(BaseException):
-    """A command took too long; no handler of the program's own shall keep this."""
+    """A command took too long; no handler of the program catches this."""
 
 
 class Place(NamedTuple):
-    """What a command meets, by the names of files in the current folder, and the command."""
+    """Files in the current folder, by name, and the command."""
 
     files: Mapping[str, bytes]
     arguments: list[str]
@@ -233,7 +233,7 @@ def _where(error: BaseException) -> str:
     return " < ".join(f"{Path(frame.filename).name}:{frame.lineno}" for frame in frames[:-4:-1])
 
 
-#: Where a command may write, while one runs, and where it did write besides.
+#: Folders that a running command may write to, and the paths that it wrote elsewhere.
 _watched: tuple[tuple[str, ...], list[str]] | None = None
 
 _WRITING = {"os.mkdir", "os.rename", "os.remove", "os.rmdir", "os.symlink", "os.link", "os.chmod"}
@@ -284,7 +284,7 @@ def _stop(_: int, __: FrameType | None) -> None:
 
 
 def _forget() -> None:
-    """Unpack archives anew."""
+    """Empty the caches, so that archives are unpacked again."""
     for kept in (user_files._folders, user_files._digests, user_files._sizes):
         kept.clear()
 
@@ -300,7 +300,7 @@ def prepared() -> Iterator[dict[str, Kind]]:
         _process_folder.cache_clear()
         try:
             for fmus in (PYTHON, NATIVE):
-                current_fmus(fmus)  # no command shall take the time to build them
+                current_fmus(fmus)  # else the first command would take the time
             run = simulate("fig4", stop_time=0.2)
             with patch.object(verify, "simulate_to_end", partial(_replay, run)):
                 found = kinds(run)

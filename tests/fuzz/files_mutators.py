@@ -44,7 +44,7 @@ def some_bytes(content: bytes, random: Random) -> bytes:
 
 
 def table(content: bytes, random: Random) -> bytes:
-    """A table of which cells, rows, columns or separators are not what they were."""
+    """Change cells, rows, columns or separators of a table."""
     rows = [line.split(",") for line in content.decode().splitlines()]
     separator, end, mark = ",", "\n", ""
     for _ in range(random.choice((1, 1, 1, 2, 4))):
@@ -120,7 +120,7 @@ def _wrong_column(rows: list[list[str]], column: int, random: Random) -> None:
 
 
 def xml(content: bytes, random: Random) -> bytes:
-    """A tree of which elements or attributes are not what they were."""
+    """Change elements or attributes of a tree."""
     if random.random() < 0.25:
         return _xml_text(content, random)
     root = ElementTree.fromstring(content)
@@ -147,7 +147,7 @@ def xml(content: bytes, random: Random) -> bytes:
 
 
 def _legal(text: str) -> str:
-    """What may stand in XML."""
+    """Drop the characters that XML does not allow."""
     return "".join(letter for letter in text if letter >= " " or letter in "\t\n\r")
 
 
@@ -173,7 +173,7 @@ def _xml_text(content: bytes, random: Random) -> bytes:
 
 
 def toml(content: bytes, random: Random) -> bytes:
-    """A scenario of which lines or values are not what they were."""
+    """Change lines or values of a scenario."""
     lines = content.decode().splitlines()
     values = (
         *("[" * n + "]" * n for n in (1, 3, 5000)), "{}", '{ a = 1 }', "9" * 400, "9" * 5000,
@@ -207,7 +207,7 @@ def toml(content: bytes, random: Random) -> bytes:
 
 
 def json(content: bytes, random: Random) -> bytes:
-    """A record of which values are not what they were."""
+    """Change values of a record."""
     if random.random() < 0.3:
         return some_bytes(content, random)
     text = content.decode()

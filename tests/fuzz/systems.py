@@ -48,7 +48,7 @@ from support.programs import compiled, play
 #: Components of a pool, and systems that are made of them.
 COMPONENTS, SYSTEMS = 4, 12
 
-#: Where the Python kind says that something was raised.
+#: File and line of an exception in the Python kind.
 _PLACE = re.compile(r"\S+\.py:\d+: ")
 
 #: Numbers that stay small, mostly: a run should come to its end.
@@ -69,10 +69,10 @@ CALM: Mapping[str, Sequence[str]] = {
     MODE: RULES[MODE],
 }
 
-#: Names of components in systems, some of which C or a program has as well.
+#: Names of components in systems, some of which are also names of C or of a program.
 NAMES = ("one", "two", "auv.plant", "auv_plant", "double", "it", "steps", "made", "3d", "ü.p")
 
-#: How long components take, in steps.
+#: Lengths of components' steps, in steps of the run.
 EVERY = (1, 1, 1, 2, 3, 4)
 
 
@@ -80,7 +80,7 @@ def files_of(seed: int) -> Mapping[str, str]:
     """The texts of all files of the component of a seed."""
     text = Component(seed, CALM).text().replace("HELPER", "helping_calm")
     text = text.replace("from pathlib", "from math import sin, sqrt\nfrom pathlib", 1)
-    text = text.replace("> 3.0:", "> 0.5:")  # what is calm is refused, too, now and then
+    text = text.replace("> 3.0:", "> 0.5:")  # so that some runs are refused
     return {f"calm_{seed}.py": text, "helping_calm.py": HELPER, "table.txt": "0.25 -0.0 1.5\n"}
 
 
@@ -124,14 +124,14 @@ class Drawn(NamedTuple):
     is_tuned: bool
 
     def plan(self, kind: str) -> Plan:
-        """What runs with FMUs of a kind."""
+        """Plan of a run with FMUs of a kind."""
         return make_plan(
             replace(self.system, components=components(self.parts, kind)), self.experiment
         )
 
     @property
     def definitions(self) -> dict[str, Definition]:
-        """Of all components."""
+        """Definitions of all components."""
         return {name: made.definition for name, made in self.parts.items()}
 
 
@@ -234,7 +234,7 @@ def _value(variable: Any, draw: Random) -> Any:
 
 
 class Run(NamedTuple):
-    """What a run has come to.
+    """Outcome of a run.
 
     Attributes:
         rows: a column for each name, time first.
@@ -296,12 +296,12 @@ class Ways:
 #: The way of programs that are checked once a step.
 QUICK = "quick"
 
-#: How a run of a system ends.
+#: Ends of a run.
 WHOLE, REFUSED, NOT_BEGUN = "to the end", "refused later", "refused at the start"
 
 
 class Outcome(NamedTuple):
-    """What a system has come to.
+    """Outcome of a system.
 
     Attributes:
         system: its name.
@@ -316,7 +316,7 @@ class Outcome(NamedTuple):
 
 
 def outcomes(seed: int, systems: int = SYSTEMS) -> Iterator[Outcome]:
-    """What the systems of a pool come to."""
+    """Run the systems of a pool."""
     first = seed * COMPONENTS
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
@@ -353,7 +353,7 @@ def _outcome(of: Drawn, ways: Ways, number: int) -> Outcome:
 
 
 def difference(wanted: Run, found: Run, is_quick: bool = False) -> str:
-    """Where a run differs, in words: a program says only which component refuses, and when."""
+    """The first difference of a run: a program reports only which component refuses, and when."""
     if is_quick and wanted.failure and found.failure:
         # It does not say what it was, nor when.
         return ""

@@ -1,8 +1,9 @@
-"""What is the user's stays the user's, whatever it is called and whatever is written beside it.
+"""No command loses a file of the user's, whatever its name and whatever files are near it.
 
-Folders full of files with names that the program itself uses go through every command that writes:
-each byte of the user's must be there afterwards, in its place or, with `--force`, moved aside. And
-what the program reads back is damaged, a bit at a time: it is refused or said, or nothing differs.
+Every command that writes runs in folders full of files whose names the program itself uses: each
+byte of the user's must be there afterwards, at its path or, with `--force`, moved. And files that
+the program reads back are damaged, a bit at a time: it refuses or reports that, or the result is
+the same.
 
     pytest tests/fuzz/test_keeping.py --hypothesis-profile=attack -m ''
 """
@@ -114,7 +115,7 @@ contents_of_files = st.one_of(
 
 
 class Folder(NamedTuple):
-    """What is in a folder before a command.
+    """Contents of a folder before a command.
 
     Attributes:
         ran: whether a run of ours has written into it before.
@@ -154,7 +155,7 @@ def _no_module_of_that_name() -> None:
 
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What commands read: a result, a study, a script, and scenarios of odd names."""
+    """Inputs of commands: a result, a study, a script, and scenarios of odd names."""
     folder = tmp_path_factory.mktemp("here")
     current_fmus()
     assert main([*RUN, "--out", str(folder / "result")]) == 0
@@ -249,7 +250,7 @@ def call(arguments: list[str]) -> tuple[int, str]:
 
 
 def is_kept(name: str, content: bytes | str, after: dict[str, bytes | str]) -> bool:
-    """Whether a file of the user's is there, or was moved aside, it or a folder that it is in."""
+    """True if a user's file, or a folder around it, is there or was moved aside."""
     if after.get(name) == content:
         return True
     parts = Path(name).parts
@@ -262,7 +263,7 @@ def is_kept(name: str, content: bytes | str, after: dict[str, bytes | str]) -> b
 
 
 def representatives(names: Iterable[str], *fast: str) -> list[Any]:
-    """All of them, of which but a few are tried fast."""
+    """All names as parameters, only some of them fast."""
     return [*fast, *slow(*(name for name in names if name not in fast))]
 
 
@@ -324,7 +325,7 @@ def flipped(folder: Path, place: float, bit: int) -> str:
 
 
 def stop_after(n: int, what: type, method: str) -> Callable[[], None]:
-    """Have this process killed when a method has been called so often."""
+    """Return a function that kills this process after `n` calls of a method."""
 
     def prepare() -> None:
         called, left = getattr(what, method), [n]
@@ -358,7 +359,7 @@ if STUDIES:
         COMMANDS["sweep"],
     )
 
-#: What says when something was made, or how long that took.
+#: Times and durations in files.
 TIMES = re.compile(rb'"(started|seconds|command|resumed_at)": .*|Written by .*')
 
 

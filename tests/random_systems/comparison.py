@@ -34,15 +34,15 @@ TOLERANCE = 1e-9
 #: fiftyfold a step: so many rows are looked at.
 _GROWING, _SOON = 1e-6, 5
 
-#: How many of so many systems run isolated as well.
+#: One in so many systems also runs isolated.
 _ISOLATED = 25
 
-#: What a run comes to; it is undecided where a system has no solution that is known well enough.
+#: Outcomes; undecided: the system has no solution that is known well enough.
 EQUAL, DIFFERS, REFUSED, UNDECIDED = "equal", "differing", "refused", "undecided"
 
 
 class Outcome(NamedTuple):
-    """What one run came to.
+    """Outcome of a run.
 
     Attributes:
         seed: of the system.
@@ -85,7 +85,7 @@ def outcomes(seed: int) -> Iterator[Outcome]:
             if seed % _ISOLATED == 0 and order == default:
                 ways.append({"isolate": True})
             if order == default:
-                # Nobody need name it.
+                # The default.
                 ways[0]["order"] = None
             for way in ways:
                 how = f"{text} {way.get('loop', 'isolated')}"

@@ -57,7 +57,7 @@ QUANTITIES = {
 
 ITEMS = ("low", "medium", "high", "top")
 
-#: What an output declares that it depends on.
+#: Declarations of the dependencies of outputs.
 RIGHT, ABSENT, UNLISTED, ALL = DECLARATIONS = ("right", "absent", "unlisted", "all")
 
 _TEXTS = ("calm", "storm", "fog", "x")
@@ -96,7 +96,7 @@ class Variable:
 
 @dataclass
 class State:
-    """What an FMU keeps: its first value, and a formula for the next one."""
+    """A state of an FMU: its first value, and a formula for the next one."""
 
     start: Any
     next: Formula = ("number", 0.0)
@@ -175,7 +175,7 @@ class Part:
 
 @dataclass
 class Drawn:
-    """A system, with its parts in the order in which they stand in the file.
+    """A system, with its parts in the order of the file.
 
     Attributes:
         as_scenario: whether it is written as one.
@@ -371,7 +371,7 @@ class _Draw:
             case "Positive":
                 return self.between(0.6, 1.6)
             case "Boolean":
-                # Rings of truth values begin with what makes all of them rest.
+                # Rings of truth values begin with the value at which all of them rest.
                 return variable.causality == "parameter" and self.chance(0.5)
             case "String":
                 return random.choice(_TEXTS)
@@ -446,7 +446,7 @@ class _Draw:
         return ("tanh", plain(self.random.choice(found))) if found and self.chance(0.3) else None
 
     def _weighted(self, fmu: Fmu, most: float) -> Formula:
-        """A sum of inputs, of which no change of one comes out greater than this."""
+        """A sum of inputs; no change of an input comes out greater than `most`."""
         chosen = self._some(self._inputs(fmu))
         terms: list[Formula] = [number(self.signed(0.1, 0.5))]
         for variable in chosen:
@@ -622,7 +622,7 @@ def _fits(output: Variable, variable: Variable, same_unit: bool) -> bool:
 def reached(
     nodes: Iterable[Hashable], edges: Iterable[tuple[Hashable, Hashable]]
 ) -> dict[Any, set[Any]]:
-    """What can be reached from each node along one edge or several."""
+    """The nodes that can be reached from each node along one edge or several."""
     after: dict[Any, set[Any]] = {node: set() for node in nodes}
     for a, b in edges:
         after[a].add(b)
@@ -669,7 +669,7 @@ def _word(value: Any) -> str:
 
 
 def model_text(fmu: Fmu) -> str:
-    """What the FMU computes, as its library reads it."""
+    """The formulas of an FMU, as its library reads them."""
 
     def counted(formula: Formula) -> str:
         words = _postfix(fmu, formula)

@@ -1,6 +1,6 @@
 """The calls of fmi-answers.md: their arguments, and how each is made on an instance.
 
-States are named by slots, so that it does not matter where they lie in memory.
+States are named by slots, so that their addresses do not matter.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ UNKNOWN = 4_294_967_295
 #: Byte 0xff, which no UTF-8 has, as a string that keeps it (`surrogateescape`).
 NOT_UTF_8 = "\udcff"
 
-#: Times a reference stands in the longest calls.
+#: Number of references in the longest calls.
 MANY = 100_000
 
 #: The functions of FMI 2.0 that only model exchange has.
@@ -113,7 +113,7 @@ class Draw:
         return self.random.choice(found)
 
     def good_value(self, variable: Variable) -> Any:
-        """A value with which a run goes on."""
+        """A value that does not end a run."""
         start, low, high = variable.start, variable.minimum, variable.maximum
         if choices := choices_of(self.description.name, variable.name):
             return self.random.choice(choices)
@@ -504,7 +504,7 @@ for _state_call in ("fmi2GetFMUstate", "fmi2DeSerializeFMUstate"):
 _plain("fmi2DeSerializeFMUstate", "bytes NULL, n > 0", no_bytes=True)
 _plain("fmi2DeSerializeFMUstate", "state NULL", bytes=b"{}", null=True)
 
-# What is not supported
+# Unsupported functions
 
 _UNSUPPORTED = (
     "fmi2SetRealInputDerivatives",
@@ -530,7 +530,7 @@ for _function in ("fmi2GetStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus"
 
 
 def make(host: Host, call: Call, saved: Saved) -> Status:
-    """Make a call on an instance; what it gives is checked as far as it does not depend on it."""
+    """Make a call on an instance; results that are the same in all states are checked."""
     how = _MADE.get(call.function)
     return host.call(call.function) if how is None else how(host, call, saved)
 
@@ -587,7 +587,7 @@ def _make_step(host: Host, call: Call, saved: Saved) -> Status:
     return host.step(call.arguments["time"], call.arguments["h"])
 
 
-#: Memory that is no state and no instance.
+#: Memory that holds neither a state nor an instance.
 _STRAY = create_string_buffer(256)
 
 

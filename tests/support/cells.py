@@ -45,7 +45,7 @@ from support.status_table import (
     without_an_instance,
 )
 
-#: Beside the kinds: FMUs in C of FMI 3.0, behind the functions of FMI 2.0.
+#: Another kind: FMUs in C of FMI 3.0, called by the functions of FMI 2.0.
 FMI3 = "FMI 3.0"
 
 #: Function and case of a row.
@@ -66,7 +66,7 @@ _SETTINGS: Mapping[Key, Callable[[Trials], Setting | None]] = {
 
 _NOT_UTF_8 = b"ta\xffnh"
 
-#: Arguments of fmi2Instantiate that differ from those of a good call.
+#: Arguments of fmi2Instantiate that make a call differ from a good one.
 CREATIONS: dict[str, dict[str, Any]] = {
     "everything as it should be": {},
     "a name that is empty": {"name": b""},
@@ -91,7 +91,7 @@ CREATIONS: dict[str, dict[str, Any]] = {
 def mistakes(
     folder: Path, other: Path, kind: str, key: Key, states: Sequence[str]
 ) -> dict[str, str]:
-    """What an FMU answers otherwise than the cells of a row say, by state.
+    """Answers of an FMU that differ from the cells of a row, by state.
 
     Args:
         folder: of the unpacked FMU.
@@ -106,7 +106,7 @@ def mistakes(
     for state in states:
         try:
             _check(library, company, kind, key, state)
-        except Exception as error:  # PythonFMU may leave one behind that is not of this trial.
+        except Exception as error:  # PythonFMU may leave the exception of an earlier trial.
             found[state] = f"{type(error).__name__}: {error}".splitlines()[0]
     return found
 
@@ -135,7 +135,7 @@ def _prepared(folder: Path, other: Path, kind: str) -> tuple[Library, Company]:
 
 
 class Company(NamedTuple):
-    """What there is beside the instance of a trial."""
+    """Instances and states that a trial needs in addition."""
 
     other: Host  #: another instance of the same FMU, stepping
     foreign: bytes  #: a serialised state of another FMU
@@ -143,13 +143,13 @@ class Company(NamedTuple):
 
 @cache
 def has_call(name: str, key: tuple[str, str]) -> bool:
-    """Whether a component has the ports that the call of a row is about."""
+    """True if a component has the ports for the call of a row."""
     return CASES[key](_draw(_description(name))) is not None
 
 
 @cache
 def _description(name: str) -> Description:
-    """What the FMU of a component says of itself, without building it."""
+    """Description of a component's FMU, without building it."""
     text = fmi2_description(source_of(name).definition, "")
     return description_in(ElementTree.fromstring(text), PYTHON)
 
@@ -265,7 +265,7 @@ class Trial:
                 self._check_unchanged(values, content)
 
     def _status(self) -> Status:
-        """What the call is answered with: PythonFMU knows fmi2OK, and fmi2Discard of steps."""
+        """Expected status; without the loader only fmi2OK, and fmi2Discard for steps."""
         answer, library, call = self.cell.answer, self.host.library, self.call
         is_get = answer.name == "refused" and "items" in call.arguments
         if not self._is_told_late and (library.answers or not is_get):
@@ -274,13 +274,13 @@ class Trial:
 
     @property
     def _is_told_late(self) -> bool:
-        """Whether it is the next steps that tell what was refused, since no loader does."""
+        """True if only the next step reports the refusal, since there is no loader."""
         answer, is_step = self.cell.answer, self.row.function == "fmi2DoStep"
         refused = answer.fails or (answer.name == "discarded" and not is_step)
         return refused and not self.host.library.answers and not self.row.is_unsound
 
     def _check_what_is_set(self, call: Call, before: Mapping[str, object]) -> bool:
-        """Whether the call is one that changes values, and has changed only those."""
+        """True if the call changes values; it must have changed no others."""
         if not call.function.startswith("fmi2Set") or "items" not in call.arguments:
             return False
         if self.cell.answer.changes_nothing:
@@ -314,7 +314,7 @@ class Trial:
             assert self.host.content() == fresh.content(), "not what a new instance is"
         self.time = 0.0
 
-    # What comes after it
+    # Later calls
 
     def check_next_step(self) -> None:
         answer = self.cell.answer

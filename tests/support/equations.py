@@ -68,7 +68,7 @@ class Error(Structure):
 
 
 def is_series(kind: Any) -> bool:
-    """Whether a type is a tuple, a vector or a matrix, the parts of which have no names."""
+    """True if a type is a tuple, a vector or a matrix: a series of parts without names."""
     return parts_of(kind) is not None and not is_record(kind)
 
 
@@ -149,7 +149,7 @@ class Equations:
         return series(kind)() if value is None else listed(kind, value)
 
     def c(self, hook: str, **given: Any) -> tuple[str, list[str]]:
-        """What a hook in C raises, or else the numbers that it returns."""
+        """The exception of a hook in C, or else the numbers that it returns."""
         name, taken, result = _CALLED[hook]
         passed = {n: self.passed(n, given.get(n)) for n in ("parameters", *taken)}
         error = Error()
@@ -162,7 +162,7 @@ class Equations:
         return "", bits(flat(passed[result])) if result else []
 
     def python(self, hook: str, **given: Any) -> Any:
-        """What a hook in Python returns."""
+        """The result of a hook in Python."""
         function: Any = self.said.hooks[hook]
         return function(**{name: given[name] for name in self.said.arguments(hook)})
 
@@ -174,5 +174,5 @@ def equations(name: str) -> Equations:
 
 
 def bits(numbers: Sequence[float]) -> list[str]:
-    """Numbers by their bits, but for NaN, of which there is one."""
+    """Numbers by their bits, except that every NaN is the same."""
     return [float(number).hex() for number in numbers]

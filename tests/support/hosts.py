@@ -52,7 +52,7 @@ def libraries_of(binary: Path) -> list[Path]:
 
 
 def bare_root(folder: Path, *binaries: Path) -> list[str]:
-    """What runs a command where there is nothing but a folder; skips where that is not allowed.
+    """Prefix of a command that runs in a bare root folder; skips if that is not allowed.
 
     Args:
         folder: in which binaries find what they are linked against, each library in its place.
@@ -108,13 +108,13 @@ def sanitized_host(name: str, folder: Path, what: str = MEMORY) -> Path:
 
 
 class Reports:
-    """What sanitizers write into a folder."""
+    """Reports of sanitizers in a folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
     def environment(self) -> dict[str, str]:
-        """Of a process that loads such FMUs without being compiled so."""
+        """Variables of a process that loads such FMUs without being compiled so."""
         command = [str(GCC), "-print-file-name=libasan.so"]
         runtime = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         log = f"log_path={self._folder / 'report'}"

@@ -70,7 +70,7 @@ class Model(NamedTuple):
 SINE = Part(A=[[0.0, 1.0], [-1.0, 0.0]], C=np.eye(2), x=[0.0, 1.0])
 
 #: Two masses, and between them a spring and a damper that belong to the second, which is tied to a
-#: wall as well.
+#: wall, too.
 TWO_MASSES = Model(
     {
         "first": Part(A=[[0, 1], [-1, -0.1]], B=[[0, 0], [1, 0]], C=np.eye(2), x=[1.0, 0.0]),

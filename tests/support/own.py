@@ -95,7 +95,7 @@ def write(folder: Path, *changes: tuple[str, str], name: str = "own_lag") -> Pat
 def imported(
     patch: pytest.MonkeyPatch, folder: Path, *changes: tuple[str, str], name: str = "own_lag"
 ) -> ModuleType:
-    """The module of the script, imported anew."""
+    """Import the module of the script again."""
     write(folder, *changes, name=name)
     patch.syspath_prepend(folder)
     patch.delitem(sys.modules, name, raising=False)

@@ -43,11 +43,11 @@ class Status(IntEnum):
 
 
 MODEL_EXCHANGE, CO_SIMULATION = range(2)
-#: Types that have functions of their own; enumerations have those of integers.
+#: Types that have functions of their own; enumerations are integers.
 TYPES = ("Real", "Integer", "Boolean", "String")
 TERMINATED_KIND, LAST_SUCCESSFUL_TIME_KIND = 3, 2
 
-#: What the functions take after the component: a pointer, a number of things, an int or a double.
+#: Arguments after the component: a pointer, a number of things, an int or a double.
 SIGNATURES = {
     "SetDebugLogging": "inp",
     "SetupExperiment": "iddid",
@@ -105,7 +105,7 @@ class Callbacks(Structure):
     )
 
 
-#: What every process has: calloc and free.
+#: calloc and free of this process.
 _LIBC = CDLL(None)
 
 #: Types of C for the types of FMI 2.0.
@@ -127,7 +127,7 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """What modelDescription.xml says. Read here: importing fmpy takes a second a process."""
+    """modelDescription.xml; importing fmpy would take a second in each process."""
 
     name: str
     guid: str
@@ -208,7 +208,7 @@ class Library:
 
     @property
     def answers(self) -> bool:
-        """Whether refusals are answered at the call: PythonFMU's own library cannot."""
+        """True if refusals are answered at the call: PythonFMU's own library cannot."""
         loaders = self.folder.glob("binaries/linux64/*_pythonfmu.so")
         return self.description.kind == NATIVE or any(loaders)
 
@@ -218,7 +218,7 @@ class Library:
 
 
 class Message(NamedTuple):
-    """What an FMU has logged."""
+    """A message of an FMU."""
 
     status: Status
     category: str
@@ -226,7 +226,7 @@ class Message(NamedTuple):
 
 
 class _Arrays:
-    """What a get call of the same variables needs, made once."""
+    """Arrays for repeated get calls of the same variables."""
 
     def __init__(self, fmi_type: str, variables: Sequence[Variable]) -> None:
         self.type = fmi_type
@@ -269,7 +269,7 @@ class Host:
         callbacks: str = "all",
         logging: bool = True,
     ) -> bool:
-        """Whether there is an instance; the defaults are a good call."""
+        """Make an instance; True if there is one. The defaults are a good call."""
         if guid == b"as declared":
             guid = self.description.guid.encode()
         if location == b"as unpacked":

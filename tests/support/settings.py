@@ -1,4 +1,4 @@
-"""What tests know of each component: from its ports and its behaviour, or from settings.toml."""
+"""Properties of each component for tests: from its ports and behaviour, or from settings.toml."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ def ports_of(name: str) -> Sequence[Port]:
 NAMES = [*components()]
 WITH_INPUTS = [n for n in NAMES if any(port.causality == "input" for port in ports_of(n))]
 
-#: One with noise and one without: between them they have ports of all types, states, and all that
-#: can go wrong. What every component has from the same base is tried on these, and on the others
-#: with `-m slow`.
+#: One with noise and one without: between them they have ports of all types, states, and every
+#: kind of refusal. Properties that all components have from the same base are tested on these, and
+#: on the others with `-m slow`.
 REPRESENTATIVES = ("AuvPlant", "ObserverController")
 EACH = [*REPRESENTATIVES, *slow(*(name for name in NAMES if name not in REPRESENTATIVES))]
 
@@ -57,7 +57,7 @@ class Trials(NamedTuple):
 
 @cache
 def trials_of(name: str) -> Trials:
-    """Values for a component from settings.toml; none for an FMU of others."""
+    """Values for a component from settings.toml; none for a third-party FMU."""
     if name not in components():
         return Trials()
     settings = tomllib.loads(SETTINGS.read_text()).get(name, {})
@@ -71,7 +71,7 @@ def choices_of(name: str, port: str) -> Sequence[int]:
 
 
 def parameters_of(name: str) -> ParameterSet[Any]:
-    """What the parameters of a component mean to its equations."""
+    """The parameters of a component, as its equations take them."""
     return source_of(name).definition.parameters
 
 

@@ -38,7 +38,7 @@ def sealed(state: dict[str, Any]) -> bytes:
 
 
 def changed(content: bytes, change: str) -> bytes:
-    """Bytes that are to be refused.
+    """Change the bytes of a state into bytes that an FMU must refuse.
 
     Args:
         content: of a good state.

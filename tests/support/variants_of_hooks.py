@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 _NUMBER = count()
 
-#: What each argument adds to what a hook returns.
+#: Term of each argument in the result of a hook.
 _PARTS = {
     "parameters": "0.3 * parameters.p",
     "state": "0.7 * state.x",
@@ -79,7 +79,7 @@ _TYPES = {name: name.capitalize() for name in ("parameters", "state", "inputs")}
 
 
 class Hooks(NamedTuple):
-    """What the hooks of a component take, and which there are."""
+    """The hooks of a component, with their arguments."""
 
     outputs: tuple[str, ...]
     derive: tuple[str, ...] | None  #: None: there is none

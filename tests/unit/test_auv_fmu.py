@@ -127,7 +127,7 @@ OURS = {
     },
 }
 
-#: Those of PythonVehicleSimulator 1.0.1, and what it does not have.
+#: Defaults of PythonVehicleSimulator 1.0.1, and of parameters that it lacks.
 REMUS_100 = {
     "Hull": {
         "length": 1.6,
@@ -229,7 +229,7 @@ def test_sets_within_the_setting_of_the_loop_are_those_with_all_defaults():
     assert all(value == type(value)() for value in (*blocks, *inner))
 
 
-def test_constants_are_those_of_section_4_1():
+def test_constants_are_the_ones_of_section_4_1():
     assert (control_point.ELL, euler.STEP) == (0.35, 0.02)
 
 
@@ -243,7 +243,7 @@ def test_the_face_is_the_orchestrators():
     assert not hasattr(auv_fmu, "nothing")
 
 
-def test_nothing_of_the_face_is_imported_before_it_is_used():
+def test_the_face_is_imported_when_it_is_used():
     code = "import sys, auv_fmu; assert auv_fmu.__version__; sys.exit(bool({}))"
     heavy = "{'numpy', 'orchestrator', 'fmus', 'fmpy'} & sys.modules.keys()"
     subprocess.run([sys.executable, "-c", code.format(heavy)], check=True)

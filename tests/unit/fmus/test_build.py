@@ -1,4 +1,4 @@
-"""What FMUs are built from, and what of it is in them."""
+"""Sources of FMUs, and contents of FMUs."""
 
 from __future__ import annotations
 

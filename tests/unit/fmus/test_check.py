@@ -1,4 +1,4 @@
-"""All that is wrong with a component is listed at once, by file and line."""
+"""All mistakes of a component are listed at once, by file and line."""
 
 from __future__ import annotations
 
@@ -125,7 +125,7 @@ def test_an_index_is_checked_as_such(tmp_path, monkeypatch, option):
     ]
 
 
-def test_what_is_no_component_is_refused(tmp_path):
+def test_other_modules_than_components_are_refused(tmp_path):
     path = tmp_path / "own.py"
     path.write_text("x = 1\n")
     assert mistakes(path) == (
@@ -154,14 +154,14 @@ def test_what_a_hook_says_wrong_is_told_with_the_line_of_the_argument(tmp_path, 
     assert mistakes("own_lag.py") == (0, [why])
 
 
-def test_what_the_component_prints_is_no_mistake(tmp_path):
+def test_printed_lines_are_not_counted_as_mistakes(tmp_path):
     path = write(tmp_path, ('__author__ = "Me"', '__author__ = print("Hello") or "Me"'))
     assert mistakes(path) == (0, ["Hello"])
 
 
 @pytest.mark.parametrize("module", ["check", "build"])
 def test_byte_code_beside_a_component_is_neither_believed_nor_written(tmp_path, module):
-    """Python would take this byte code for that of the text, whatever the text says."""
+    """Python would run this byte code instead of the text."""
     write(tmp_path, ("from math import expm1", "from beside import expm1"))
     (tmp_path / "beside.py").write_text("from math import expm1\n")
     (tmp_path / "other.py").write_text("raise SystemExit('other code')\n")

@@ -1,4 +1,4 @@
-"""What the user names is found, taken for what it is, and its mistakes are told by line."""
+"""A script is found and recognised, and its mistakes are reported by line."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SLAVE = "from pythonfmu import Fmi2Slave\n\n\nclass Own(Fmi2Slave):\n    pass\n"
 
 
 def built(*arguments: object) -> tuple[int, str]:
-    """How a build ends that is a process of its own, and what it says."""
+    """Exit status and output of a build in a process of its own."""
     process = subprocess.run(
         [sys.executable, "-P", "-m", "fmus.build", *map(str, arguments)],
         capture_output=True, text=True, check=False,

@@ -135,7 +135,7 @@ def test_alpha_1_at_most_is_attained():
 
 @given(gains=gains, more=st.floats(1.0, 10.0))
 def test_no_gain_makes_alpha_3_larger(gains, more):
-    """It holds gains with a minus alone: the region does not grow with them."""
+    """It has gains only with a minus: the region does not grow with them."""
     alpha_3 = theorem(DAMPED, ELL, gains, 1.0).alphas.alpha_3
     for name in ("K1", "K2", "lambda_", "k_d"):
         larger = gains._replace(**{name: np.multiply(more, getattr(gains, name))})
@@ -209,7 +209,7 @@ def test_no_zetas_reach_further(room, k, share):
 
 @given(room=positive, k=positive, zeta_2=st.floats(0.0, 100.0), x=st.floats(0.0, 1.0))
 def test_no_ball_is_left_for_a_reference_that_moves(room, k, zeta_2, x):
-    """Faster than room / k, which is half of what (31) asks for: zeta_1 is k |dy_d| at least."""
+    """Faster than room / k, half of the bound of (31): zeta_1 is k |dy_d| at least."""
     speed = 0.5001 * reach(room, k)
     zeta_1 = k * speed
     assert not 2.0 * room - (zeta_1 + zeta_2) > zeta_1 + zeta_2 * x**2

@@ -64,7 +64,7 @@ def test_it_runs_as_fast_as_is_published():
     assert state.nu[0] == pytest.approx(2.5, rel=0.03)
 
 
-def test_propeller_heels_the_vehicle_as_far_as_the_righting_moment_lets_it():
+def test_propeller_heels_the_vehicle_against_the_righting_moment():
     """At the end m g z sin(phi) is a tenth of the torque of the propeller at that speed."""
     state = steps(PARAMETERS, begin(PARAMETERS, STILL), FULL_AHEAD, STILL, STILL, STEP, 6000)
     n, u = 1525 / 60, state.nu[0]
@@ -118,12 +118,12 @@ def test_a_motion_beyond_the_model_is_refused_and_what_follows_is_fine():
 
 
 @given(nu=st.tuples(*(st.floats(-5.7, 5.7),) * 6))
-def test_from_any_motion_within_the_model_steps_go_on(nu):
+def test_from_any_motion_within_the_model_steps_continue(nu):
     """5.7 of each of three makes 9.9."""
     moving = Parameters(nu0=nu, eta0=(0.0, 0.0, 0.0, 0.5, 1.2, 0.0))
     state = steps(moving, begin(moving, STILL), AMIDSHIPS, STILL, STILL, STEP, 25)
     assert sqrt(sum(x * x for x in state.nu[:3])) < 10.0
 
 
-def test_tail_is_behind():
+def test_tail_is_at_the_stern():
     assert Tail().x == -Hull().length / 2

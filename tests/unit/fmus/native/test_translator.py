@@ -39,7 +39,7 @@ from support.equations import (
 from support.language import HEAD, module_of
 from support.settings import NAMES, behaviour_of
 
-#: Where equations live, and where they overflow.
+#: Magnitudes of usual numbers, and of numbers that overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
 
 every = pytest.mark.parametrize("name", NAMES)
@@ -82,7 +82,7 @@ def test_it_has_no_memory_and_no_variable_outside_of_functions(name):
         ("def begin(parameters: list[float]) -> A:\n    return A(1.0)\n", "is not a type"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_translated_is_named(tmp_path: Path, text, why):
+def test_untranslatable_parts_are_named(tmp_path: Path, text, why):
     package = tmp_path / "own"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -157,7 +157,7 @@ def test_states_are_refused_alike(name, random):
     agree(both, "check_state", parameters=parameters, state=state)
 
 
-def test_text_of_a_restart_is_that_of_python():
+def test_text_of_a_restart_is_pythons():
     both = equations("ObserverController")
     assert both.library.restarted().decode() % 0.02 == both.said.restarted.format(t=0.02)
 
@@ -178,7 +178,7 @@ def drawn_type(random: Random, depth: int = 0) -> Any:
     return NamedTuple(name, [(f"x{i}", part) for i, part in enumerate(parts)])
 
 
-def test_draws_lie_in_their_order_in_whatever_they_are_taken_as(tmp_path):
+def test_draws_keep_their_order_in_every_type(tmp_path):
     emitter, lines, calls = Emitter([]), [], []
     for i in range(60):
         hint = drawn_type(Random(i))
@@ -293,8 +293,8 @@ def start(x: Annotated[Vector, 100]) -> Annotated[Vector, 10]:
 """
 
 
-def test_depth_is_that_of_the_calls_within_each_other(tmp_path):
-    """What start holds: x, y, its result, two sums and a product; own_sum: two arguments, c and d.
+def test_depth_includes_calls_within_calls(tmp_path):
+    """start holds x, y, its result, two sums and a product; own_sum two arguments, c and d.
 
     The matrix is not copied.
     """

@@ -1,4 +1,4 @@
-"""What FMI 3.0 asks for, beside what is written of a few ports."""
+"""The requirements of FMI 3.0, and the descriptions of a few ports."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ def terminals() -> list[ElementTree.Element]:
     return [*ElementTree.fromstring(terminals_and_icons(GROUPS)).iterfind("Terminals/Terminal")]
 
 
-def test_groups_of_inputs_and_outputs_alone_are_terminals():
+def test_only_groups_of_inputs_and_outputs_are_terminals():
     assert [
         (
             terminal.get("name"),
@@ -183,7 +183,7 @@ def test_inputs_are_on_the_left_and_outputs_on_the_right_of_the_icon():
     assert output["y1"] == -output["y2"]
 
 
-def test_arrays_depend_on_all_that_their_elements_do():
+def test_arrays_have_the_dependencies_of_their_elements():
     arrays = [Array(name, f"The {name}", (2,)) for name in "uy"]
     ports = (
         *(Port(f"u.{k}", "input", *REAL, f"The u: {k}", "m", 0.5, array=arrays[0]) for k in "ab"),

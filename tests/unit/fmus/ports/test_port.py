@@ -1,4 +1,4 @@
-"""What a port takes, and what it says where it does not."""
+"""The values that a port takes, and its messages about others."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def test_wrong_parameter_is_an_error_before_the_run(name, parameter, value):
 
 
 def test_without_a_loader_no_step_is_made_with_another_value():
-    """The host has been answered fmi2OK, and shall not find out by its results."""
+    """The host was answered fmi2OK, and must not have to find out by its results."""
     driver = ClassInstance("AuvPlant", plain=True, m11=0.0)
     assert driver.answers() == []
     for _ in range(2):
@@ -124,7 +124,7 @@ def test_library_beside_the_loader_tells_a_slave_of_it(tmp_path, libraries, plai
         ("AuvPlant", {"tau_max__u": 1e300}, {"tau__u": 1e300}),
     ],
 )
-def test_one_wild_sample_is_refused_and_the_run_goes_on_after_it(name, start, sample):
+def test_one_wild_sample_is_refused_and_the_run_continues(name, start, sample):
     driver, calm = ClassInstance(name, **start), ClassInstance(name, **start)
     driver.set(**sample)
     assert not driver.step()

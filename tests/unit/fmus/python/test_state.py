@@ -50,7 +50,7 @@ def with_generator(place: int, value: Any) -> Callable[[Snapshot], Any]:
     return change
 
 
-#: Of AuvPlant: key of the state, and what another value of it is made of.
+#: A key of the state of AuvPlant, and a function that gives another value for it.
 SPOILED = {
     "parameter out of range": ("parameters", with_parameter("m11", -25.0)),
     "parameter not finite": ("parameters", with_parameter("m11", nan)),
@@ -145,7 +145,7 @@ def test_state_with_a_part_missing_is_refused(driver):
 
 @given(place=st.integers(0), byte=st.integers(0, 255))
 def test_no_changed_byte_of_a_state_is_overlooked(place, byte):
-    """What is accepted is the same state, written in another way; what is not changes nothing."""
+    """An accepted state is the same, written in another way; a refused one changes nothing."""
     driver = ClassInstance("ObserverController")
     driver.excite(1)
     driver.step()
@@ -176,8 +176,8 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 @given(name=st.sampled_from(REPRESENTATIVES), data=st.data())
-def test_state_with_any_other_values_is_refused_whole_or_goes_on(name: str, data: st.DataObject):
-    """The checksum is taken as right: the values are all that speaks against it."""
+def test_changed_state_is_refused_as_a_whole_or_continues(name: str, data: st.DataObject):
+    """The checksum counts as right, so only the values can be wrong."""
     driver = ClassInstance(name)
     driver.excite(1)
     driver.step()
@@ -221,7 +221,7 @@ def test_state_that_is_not_fit_for_bytes_says_so():
     assert "JSON" in driver.messages()[0]
 
 
-def test_text_of_a_state_is_no_trap_for_the_message(driver):
+def test_text_of_a_state_does_not_break_the_message(driver):
     saved = driver.slave._fmu_state_from_bytes(b'{"unusable": "%s' + b"x" * 10_000 + b'"}')
     driver.slave._set_fmu_state(saved)
     [message] = driver.messages()
@@ -229,7 +229,7 @@ def test_text_of_a_state_is_no_trap_for_the_message(driver):
     assert len(message) < 600
 
 
-#: What is not in the paper, in a run of AuvPlant.
+#: Additions to the paper, in a run of AuvPlant.
 ADDITIONS = {"roll": False, "current__x": 0.3, "actuator__T__u": 0.2, "actuator__T__q": 1e-3}
 
 
@@ -254,7 +254,7 @@ def test_state_that_rolls_is_none_of_a_vehicle_that_does_not():
     assert "its roll, which is held at zero, is not zero" in other.messages()[0]
 
 
-def test_state_whose_initialisation_was_refused_is_one_of_an_instance_that_can_go_on():
+def test_state_after_a_refused_initialisation_can_be_restored():
     driver = ClassInstance("AuvPlant", nu0__p=1e160)
     saved = driver.slave._fmu_state_from_bytes(
         driver.slave._fmu_state_to_bytes(driver.slave._get_fmu_state())
@@ -332,7 +332,7 @@ def test_json_gives_a_state_back():
         (bool, 1, "1 is not of type bool"),
     ],
 )
-def test_what_is_of_another_shape_is_refused(kind, value, why):
+def test_values_of_another_shape_are_refused(kind, value, why):
     with pytest.raises(Refusal) as refusal:
         restored(kind, value)
     assert str(refusal.value) == why
@@ -358,7 +358,7 @@ class Typed(NamedTuple):
 TYPED = Typed(-3, Colour.BLUE, Vector((3.0, 0.0)), Matrix(((0.0, 4.0),)))
 
 
-def test_size_is_that_of_vectors_and_matrices_too_and_of_no_integer():
+def test_size_includes_vectors_and_matrices_and_no_integers():
     assert measuring(Typed)(TYPED) == 25.0
 
 
