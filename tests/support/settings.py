@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fmus.discovery import components, source_of
-from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import Port
 from support.tiers import slow
@@ -73,7 +72,3 @@ def choices_of(name: str, port: str) -> Sequence[int]:
 def parameters_of(name: str) -> ParameterSet[Any]:
     """The parameters of a component, as its equations take them."""
     return source_of(name).definition.parameters
-
-
-def behaviour_of(name: str) -> Behaviour:
-    return source_of(name).definition.behaviour

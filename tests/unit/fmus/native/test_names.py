@@ -28,7 +28,6 @@ COMMANDS = {
     "this machine's": (str(machines_compiler()),),
     "Windows": (*ZIG, "x86_64-windows-gnu"),
     "macOS": (*ZIG, "aarch64-macos"),
-    "musl": (*ZIG, "x86_64-linux-musl"),
 }
 
 #: Uses a variable beside everything that equations call.

@@ -37,7 +37,7 @@ from support.equations import (
     structure,
 )
 from support.language import HEAD, module_of
-from support.settings import NAMES, behaviour_of
+from support.settings import EACH, NAMES
 
 #: Magnitudes of usual numbers, and of numbers that overflow.
 MAGNITUDES = (1e-3, 1.0, 1.0, 1.0, 10.0, 1e9, 1e100, 1e160, 1e308)
@@ -130,7 +130,7 @@ def agree(both: Equations, hook: str, **given: Any) -> Any:
     return result
 
 
-@every
+@pytest.mark.parametrize("name", EACH)
 @settings(max_examples=15)
 @given(random=randoms)
 def test_hooks(name, random):
@@ -143,13 +143,10 @@ def test_hooks(name, random):
             agree(both, hook, **given)
 
 
-@pytest.mark.parametrize(
-    "name", [name for name in NAMES if behaviour_of(name).hooks["check_state"]]
-)
 @given(random=randoms)
-def test_states_are_refused_alike(name, random):
+def test_states_are_refused_alike(random):
     """Most that are random, and some that a run begins with."""
-    both = equations(name)
+    both = equations("AuvPlant")
     parameters, inputs = (value(both.kind(it), random, 0.0) for it in ("parameters", "inputs"))
     state = agree(both, "start", parameters=parameters, inputs=inputs, t=random.random())
     if state is None or random.random() < 0.5:
