@@ -46,23 +46,16 @@ TYPES = (FLOAT, INT, BOOL, MODE, *PARTS)
 #: Expressions of each type.
 RULES: Mapping[str, Sequence[str]] = {
     FLOAT: (
-        "0.5 * {f} - 0.25 * {f}",
-        "({f} if {b} else 0.5 * {f})",
-        "{f} / (2.0 + abs({f}))",
-        "1e305 * {f} * {f}",
-        "white_noise({f})",
-        "TABLE[{i} % 3]",
+        "0.5 * {f} - 0.25 * {f}", "({f} if {b} else 0.5 * {f})", "{f} / (2.0 + abs({f}))",
+        "1e305 * {f} * {f}", "white_noise({f})", "TABLE[{i} % 3]",
     ),
     INT: (
-        "({i} % 1000 + 3 * ({i} % 1000)) % 997",
-        "int({f} % 50.0)",
-        "max({i} % 7, -2)",
-        "min({i} % 5, int({b}))",
-        "({m} + {i} % 9) % 100",
+        "({i} % 1000 + 3 * ({i} % 1000)) % 997", "int({f} % 50.0)", "max({i} % 7, -2)",
+        "min({i} % 5, int({b}))", "({m} + {i} % 9) % 100",
     ),
     BOOL: ("{f} < {f}", "not {b}", "{i} % 3 == {i} % 2", "{m} == Mode.LOW"),
     MODE: ("(Mode.HIGH if {b} else {m})", "Mode.LOW"),
-}
+}  # fmt: skip
 LETTERS = {"f": FLOAT, "i": INT, "b": BOOL, "m": MODE}
 CONSTANTS = {FLOAT: ("-0.0", "1.25"), INT: ("0", "-3"), BOOL: ("True",), MODE: ("Mode.OFF",)}
 
@@ -98,24 +91,14 @@ HELPERS = (("plant", "white_noise"), ("euler", "internal_steps"), ("closed_loop"
 
 #: Changes that are refused, or mean the same in both kinds.
 MISTAKES = (
-    ("HIGH = 7", "HIGH = 2147483648"),
-    ("HIGH = 7", "HIGH = 4294967303"),
-    ("HIGH = 7", "HIGH = -5000000000"),
-    ("] = 4\n", "] = True\n"),
-    ("] = 4\n", "] = Mode.HIGH\n"),
-    ("] = 0.25\n", "] = 1\n"),
-    ('"double")', '"x")'),
-    ('"double")', "'a\"b')"),
-    ('"double")', '"back\\\\slash")'),
-    ('"double")', '"two\\nlines")'),
-    ('description="', 'description="\\x0b'),
-    ('description="', 'description="two\\nlines'),
-    ("Mode.LOW", "(Mode.LOW + 1) % 3"),
-    ("Mode.OFF", "0"),
-    ("] = 0\n", "] = False\n"),
-    ("SAMPLED = True", "SAMPLED = 1"),
-    ("{t:g}", "{t!r}"),
-)
+    ("HIGH = 7", "HIGH = 2147483648"), ("HIGH = 7", "HIGH = 4294967303"),
+    ("HIGH = 7", "HIGH = -5000000000"), ("] = 4\n", "] = True\n"), ("] = 4\n", "] = Mode.HIGH\n"),
+    ("] = 0.25\n", "] = 1\n"), ('"double")', '"x")'), ('"double")', "'a\"b')"),
+    ('"double")', '"back\\\\slash")'), ('"double")', '"two\\nlines")'),
+    ('description="', 'description="\\x0b'), ('description="', 'description="two\\nlines'),
+    ("Mode.LOW", "(Mode.LOW + 1) % 3"), ("Mode.OFF", "0"), ("] = 0\n", "] = False\n"),
+    ("SAMPLED = True", "SAMPLED = 1"), ("{t:g}", "{t!r}"),
+)  # fmt: skip
 
 HEAD = '''\
 """A random component."""

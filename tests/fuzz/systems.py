@@ -54,20 +54,14 @@ _PLACE = re.compile(r"\S+\.py:\d+: ")
 #: Numbers that stay small, mostly: a run should come to its end.
 CALM: Mapping[str, Sequence[str]] = {
     FLOAT: (
-        "0.5 * {f} - 0.25 * {f}",
-        "({f} if {b} else 0.5 * {f})",
-        "{f} / (2.0 + abs({f}))",
-        "{f} * {f} / (1.0 + abs({f}))",
-        "min({f}, max({f}, -3.0))",
-        "sqrt(abs({f}))",
-        "sin({f})",
-        "0.001 * {i}",
-        "TABLE[{i} % 3]",
+        "0.5 * {f} - 0.25 * {f}", "({f} if {b} else 0.5 * {f})", "{f} / (2.0 + abs({f}))",
+        "{f} * {f} / (1.0 + abs({f}))", "min({f}, max({f}, -3.0))", "sqrt(abs({f}))", "sin({f})",
+        "0.001 * {i}", "TABLE[{i} % 3]",
     ),
     INT: RULES[INT],
     BOOL: RULES[BOOL],
     MODE: RULES[MODE],
-}
+}  # fmt: skip
 
 #: Names of components in systems, some of which are also names of C or of a program.
 NAMES = ("one", "two", "auv.plant", "auv_plant", "double", "it", "steps", "made", "3d", "ü.p")

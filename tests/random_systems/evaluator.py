@@ -48,23 +48,11 @@ class NoSolution(Exception):
 
 
 _OPERATORS: dict[str, Callable[..., Any]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a / b,
-    "sin": sin,
-    "tanh": tanh,
-    "sqrt": sqrt,
-    "log": log,
-    "max": max,
-    "mod": fmod,
-    "floor": floor,
-    ">": lambda a, b: a > b,
-    "or": lambda a, b: bool(a or b),
-    "not": lambda a: not a,
-    "same": lambda a, b: a == b,
-    "pick": lambda a, b, c: b if a else c,
-}
+    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a,
+    b: a / b, "sin": sin, "tanh": tanh, "sqrt": sqrt, "log": log, "max": max, "mod": fmod,
+    "floor": floor, ">": lambda a, b: a > b, "or": lambda a, b: bool(a or b),
+    "not": lambda a: not a, "same": lambda a, b: a == b, "pick": lambda a, b, c: b if a else c,
+}  # fmt: skip
 
 
 def value_of(formula: Formula, scope: Mapping[Any, Any]) -> Any:

@@ -37,16 +37,10 @@ class Quantity(NamedTuple):
 
 
 UNITS = {
-    "kg": Unit("kg"),
-    "g": Unit("kg", 1e-3),
-    "t": Unit("kg", 1e3),
-    "K": Unit("K"),
-    "degC": Unit("K", 1.0, 273.15),
-    "rad": Unit("rad"),
-    "deg": Unit("rad", 0.017453292519943295),
-    "m/s": Unit("m s"),
-    "km/h": Unit("m s", 1.0 / 3.6),
-}
+    "kg": Unit("kg"), "g": Unit("kg", 1e-3), "t": Unit("kg", 1e3), "K": Unit("K"),
+    "degC": Unit("K", 1.0, 273.15), "rad": Unit("rad"), "deg": Unit("rad", 0.017453292519943295),
+    "m/s": Unit("m s"), "km/h": Unit("m s", 1.0 / 3.6),
+}  # fmt: skip
 _BASES = {"kg": 'kg="1"', "K": 'K="1"', "rad": 'rad="1"', "m s": 'm="1" s="-1"'}
 QUANTITIES = {
     "mass": Quantity(("kg", "g", "t"), 0.0, 5.0),

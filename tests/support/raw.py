@@ -68,17 +68,11 @@ SIGNATURES = {
     **{f"Get{fmi_type}Status": "ip" for fmi_type in ("", *TYPES)},
 }
 OF_MODEL_EXCHANGE = {
-    "EnterEventMode": "",
-    "NewDiscreteStates": "p",
-    "EnterContinuousTimeMode": "",
-    "CompletedIntegratorStep": "ipp",
-    "SetTime": "d",
-    "SetContinuousStates": "pn",
-    "GetDerivatives": "pn",
-    "GetEventIndicators": "pn",
-    "GetContinuousStates": "pn",
+    "EnterEventMode": "", "NewDiscreteStates": "p", "EnterContinuousTimeMode": "",
+    "CompletedIntegratorStep": "ipp", "SetTime": "d", "SetContinuousStates": "pn",
+    "GetDerivatives": "pn", "GetEventIndicators": "pn", "GetContinuousStates": "pn",
     "GetNominalsOfContinuousStates": "pn",
-}
+}  # fmt: skip
 
 
 def harmless() -> dict[str, list[Any]]:

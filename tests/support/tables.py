@@ -13,14 +13,9 @@ from orchestrator.cosim import Experiment, Header, Order, PortName, Table
 from orchestrator.vehicle.signals import STANDARD, Loop
 
 COLUMNS = (
-    *STANDARD.posture,
-    *STANDARD.nu,
-    *STANDARD.dy,
-    *STANDARD.commanded,
-    *STANDARD.y_d,
-    *STANDARD.dy_hat,
-    *STANDARD.theta_hat,
-)
+    *STANDARD.posture, *STANDARD.nu, *STANDARD.dy, *STANDARD.commanded, *STANDARD.y_d,
+    *STANDARD.dy_hat, *STANDARD.theta_hat,
+)  # fmt: skip
 STEP = 0.02
 UNITS = {
     f"{group}.{member}": unit

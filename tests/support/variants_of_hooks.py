@@ -11,13 +11,9 @@ _NUMBER = count()
 
 #: Term of each argument in the result of a hook.
 _PARTS = {
-    "parameters": "0.3 * parameters.p",
-    "state": "0.7 * state.x",
-    "derived": "0.9 * derived",
-    "inputs": "0.2 * inputs.u",
-    "t": "0.01 * t",
-    "h": "h",
-}
+    "parameters": "0.3 * parameters.p", "state": "0.7 * state.x", "derived": "0.9 * derived",
+    "inputs": "0.2 * inputs.u", "t": "0.01 * t", "h": "h",
+}  # fmt: skip
 
 _TEXT = """
 from typing import Annotated, NamedTuple

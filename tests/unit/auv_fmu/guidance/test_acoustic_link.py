@@ -52,15 +52,11 @@ def events(parameters: Parameters, end: float, ages, y, receiver):
 
 
 links = st.builds(
-    Parameters,
-    period=st.floats(0.05, 3.0),
-    sound_speed=st.floats(5.0, 1500.0),
-    latency=st.floats(0.0, 2.0),
-    loss=st.sampled_from([0.0, 0.3, 1.0]),
-    seed=st.integers(-(2**31), 2**31 - 1),
-    outage_start=st.floats(0.0, 10.0),
+    Parameters, period=st.floats(0.05, 3.0), sound_speed=st.floats(5.0, 1500.0),
+    latency=st.floats(0.0, 2.0), loss=st.sampled_from([0.0, 0.3, 1.0]),
+    seed=st.integers(-(2**31), 2**31 - 1), outage_start=st.floats(0.0, 10.0),
     outage_duration=st.sampled_from([0.0, 5.0]),
-)
+)  # fmt: skip
 
 
 @given(links, st.floats(0.01, 4.0), st.integers(1, 60))

@@ -38,15 +38,9 @@ def test_alphas_are_those_below_40(gains):
 
 
 @given(
-    t_ez=three,
-    t_z=three,
-    r_1=three,
-    r_2=three,
-    gains=gains,
-    damping=vectors(positive, 3),
-    inertia=vectors(positive, 3),
-    v0=units,
-)
+    t_ez=three, t_z=three, r_1=three, r_2=three, gains=gains, damping=vectors(positive, 3),
+    inertia=vectors(positive, 3), v0=units,
+)  # fmt: skip
 def test_alphas_bound_what_is_known_of_37(t_ez, t_z, r_1, r_2, gains, damping, inertia, v0):
     """The terms of (37) without chi, xi and theta, for any D_2 and M_2, against (40).
 

@@ -35,15 +35,10 @@ def test_water_moves_with_waves_and_current(z, t, depth):
 
 
 @given(
-    z=st.floats(-2.0, 19.0),
-    t=times,
-    depth=depths,
-    Hs=st.floats(0.1, 3.0),
-    s=st.sampled_from((0.0, 2.0, 10.0)),
-    speed=st.floats(0.0, 2.0),
-    root=st.sampled_from((0.0, 2.0, 7.0)),
-    seed=st.integers(0, 1000),
-)
+    z=st.floats(-2.0, 19.0), t=times, depth=depths, Hs=st.floats(0.1, 3.0),
+    s=st.sampled_from((0.0, 2.0, 10.0)), speed=st.floats(0.0, 2.0),
+    root=st.sampled_from((0.0, 2.0, 7.0)), seed=st.integers(0, 1000),
+)  # fmt: skip
 def test_acceleration_follows_the_water_on_its_way(z, t, depth, Hs, s, speed, root, seed):
     """Central differences of the velocity, along the way that it goes: du/dt + (u . grad) u."""
     assume(abs(z) > 0.01)  # there the vertical gradient jumps

@@ -25,16 +25,10 @@ PORTS = (
     Port("n", "parameter", "fixed", "Integer", "Number", start=-3),
     Port("on", "parameter", "fixed", "Boolean", "Switch", start=True),
     Port(
-        "kind",
-        "parameter",
-        "fixed",
-        "Enumeration",
-        "Kind",
-        start=1,
-        choices={"soft": 1, "hard": 4},
-        enumeration="Kind",
+        "kind", "parameter", "fixed", "Enumeration", "Kind", start=1,
+        choices={"soft": 1, "hard": 4}, enumeration="Kind",
     ),
-)
+)  # fmt: skip
 
 DESCRIPTION = """
 <fmiModelDescription fmiVersion="3.0" modelName="It" instantiationToken="{1}"

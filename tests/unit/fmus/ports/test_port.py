@@ -32,16 +32,10 @@ LARGEST = float.fromhex("0x1.fffffffffffffp+1023")
 @pytest.mark.parametrize(
     ("port", "value"),
     [
-        (REAL, 0.5),
-        (REAL, 2.5),
-        (REAL, 1),
-        (UNBOUNDED, LARGEST),
-        (UNBOUNDED, -LARGEST),
-        (INTEGER, -(2**31)),
-        (BOOLEAN, True),
-        (NAMED, -7),
+        (REAL, 0.5), (REAL, 2.5), (REAL, 1), (UNBOUNDED, LARGEST), (UNBOUNDED, -LARGEST),
+        (INTEGER, -(2**31)), (BOOLEAN, True), (NAMED, -7),
     ],
-)
+)  # fmt: skip
 def test_good_value_comes_back(port, value):
     assert port.checked(value) is value
 

@@ -29,22 +29,15 @@ def test_infinities_that_cancel_are_found():
 @pytest.mark.parametrize(
     ("name", "parameter", "value"),
     [
-        ("AuvPlant", "m11", 0.0),
-        ("AuvPlant", "d66", -1.0),
-        ("AuvPlant", "noise__std", nan),
-        ("AuvPlant", "h_max", 0.0),
-        ("MotionPlanner", "m55", -22.5),
-        ("MotionPlanner", "tau_d__u", inf),
-        ("ObserverController", "eps_t", 0.0),
-        ("AuvPlant", "actuator__T__u", -0.1),
-        ("AuvPlant", "current__x", nan),
-        ("ObserverController", "saturation", 4),
-        ("ObserverController", "observer", -1),
-        ("ObserverController", "k_d", -50.0),
-        ("DisturbanceGenerator", "omega_d", nan),
+        ("AuvPlant", "m11", 0.0), ("AuvPlant", "d66", -1.0), ("AuvPlant", "noise__std", nan),
+        ("AuvPlant", "h_max", 0.0), ("MotionPlanner", "m55", -22.5),
+        ("MotionPlanner", "tau_d__u", inf), ("ObserverController", "eps_t", 0.0),
+        ("AuvPlant", "actuator__T__u", -0.1), ("AuvPlant", "current__x", nan),
+        ("ObserverController", "saturation", 4), ("ObserverController", "observer", -1),
+        ("ObserverController", "k_d", -50.0), ("DisturbanceGenerator", "omega_d", nan),
         ("PdController", "sigma", -1.0),
     ],
-)
+)  # fmt: skip
 def test_wrong_parameter_is_an_error_before_the_run(name, parameter, value):
     """There are hosts that ignore fmi2Discard: they would run with the value before."""
     driver = ClassInstance(name, **{parameter: value})
