@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from importlib import import_module
+from io import StringIO
 from pathlib import Path
 from types import ModuleType
+from unittest.mock import patch
 
 import fmpy
 import pytest
@@ -100,6 +104,23 @@ def imported(
     patch.syspath_prepend(folder)
     patch.delitem(sys.modules, name, raising=False)
     return import_module(name)
+
+
+def called(main: Callable[[], int], folder: Path, *arguments: object) -> tuple[int, str, str]:
+    """Call a module's command line, and forget the modules that it imported from a folder.
+
+    Returns:
+        Exit status, output and errors.
+
+    """
+    out, errors = StringIO(), StringIO()
+    argv = ["main", *map(str, arguments)]
+    with patch.object(sys, "argv", argv), redirect_stdout(out), redirect_stderr(errors):
+        status = main()
+    for name, module in [*sys.modules.items()]:
+        if str(getattr(module, "__file__", None)).startswith(str(folder.resolve())):
+            del sys.modules[name]
+    return status, out.getvalue(), errors.getvalue()
 
 
 def built(script: Path, kind: str, folder: Path, fmi: str = "2") -> Path:
