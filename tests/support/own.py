@@ -125,11 +125,11 @@ def called(main: Callable[[], int], folder: Path, *arguments: object) -> tuple[i
 
 def built(script: Path, kind: str, folder: Path, fmi: str = "2") -> Path:
     """Build the FMU of a script for this machine, and unpack it into a folder."""
-    fmu = folder.with_suffix(".fmu")
+    fmu, source = folder.with_suffix(".fmu"), source_of_script(script)
+    _ = source.definition  # from now on the files that the script reads are known
     if kind == PYTHON:
-        PythonKind(best_loader()).write(source_of_script(script), fmu)
+        PythonKind(best_loader()).write(source, fmu)
     else:
         here = platforms(fmi, None)
-        native = NativeKind(fmi, here, compiler_for(here), lambda line: None)
-        native.write(source_of_script(script), fmu)
+        NativeKind(fmi, here, compiler_for(here), lambda line: None).write(source, fmu)
     return Path(fmpy.extract(str(fmu), folder))
