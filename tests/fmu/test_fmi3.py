@@ -54,11 +54,6 @@ def plant(unpacked: Path) -> Fmi3Library:
 # In fmpy
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_fmu_is_valid(dist3: Path, name: str):
-    assert validate_fmu(str(dist3 / f"{name}.fmu")) == []
-
-
 @pytest.mark.parametrize("name", EACH)
 def test_fmpy_gets_the_rows_of_the_python_kind(dist: Path, dist3: Path, name: str):
     ours, theirs = (
@@ -368,42 +363,6 @@ def test_messages_are_neither_formats_nor_names_of_variables(plant: Fmi3Library)
     assert not host.instantiate(guid=b"50%#1#")
     [message] = host.messages
     assert "token 50%##1## does not match" in message.text
-
-
-def slave_of(folder: Path, name: str) -> FMU3Slave:
-    """An instance in fmpy, about to be initialised."""
-    description = fmpy.read_model_description(str(folder))
-    slave = FMU3Slave(
-        instanceName=name,
-        guid=description.guid,
-        unzipDirectory=str(folder),
-        modelIdentifier=description.coSimulation.modelIdentifier,
-    )
-    slave.instantiate()
-    slave.enterInitializationMode(startTime=0.0)
-    return slave
-
-
-def test_state_continues_in_another_instance_bit_for_bit(unpacked: Path):
-    """Through fmpy, as bytes."""
-    slaves = one, other = [slave_of(unpacked / "AuvPlant", name) for name in ("one", "other")]
-    description = fmpy.read_model_description(str(unpacked / "AuvPlant"))
-    outputs = [v.valueReference for v in description.modelVariables if v.causality == "output"][:-1]
-    for slave in slaves:
-        slave.exitInitializationMode()
-    one.setFloat64([1, 2, 3], [10.0, 0.1, 0.2])
-    for k in range(50):
-        one.doStep(k * H, H)
-    content = one.serializeFMUState(one.getFMUState())
-    other.setFMUState(other.deserializeFMUState(content))
-    for k in range(50, 100):
-        for slave in slaves:
-            slave.doStep(k * H, H)
-        # With noise from the same generator.
-        assert one.getFloat64(outputs) == other.getFloat64(outputs)
-    for slave in slaves:
-        slave.terminate()
-        slave.freeInstance()
 
 
 # Arrays

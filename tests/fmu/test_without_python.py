@@ -152,13 +152,11 @@ def test_arm_gives_the_same_bit_for_bit(native: Path, elsewhere: Path, scenario:
 @pytest.mark.slow
 @pytest.mark.skipif(CMAKE is None, reason="cmake is not installed")
 def test_fmpy_builds_the_same_from_the_sources(native: Path, tmp_path: Path):
-    systems = [system_of(native, scenario) for scenario in SCENARIOS]
-    for name in {part.fmu.stem for system in systems for part in system.components.values()}:
+    for name in {part.fmu.stem for part in system_of(native, "fig4").components.values()}:
         folder = Path(fmpy.extract(native / f"{name}.fmu", tmp_path / name))
         shutil.rmtree(folder / "binaries")
         build_platform_binary(folder)
         Path(shutil.make_archive(str(folder), "zip", folder)).rename(tmp_path / f"{name}.fmu")
-    for scenario in SCENARIOS:
-        ours, theirs = (run(system_of(fmus, scenario), 20.0, 0.02) for fmus in (native, tmp_path))
-        columns = ours.header.columns
-        np.testing.assert_array_equal(ours.group(*columns), theirs.group(*columns))
+    ours, theirs = (run(system_of(fmus, "fig4"), 20.0, 0.02) for fmus in (native, tmp_path))
+    columns = ours.header.columns
+    np.testing.assert_array_equal(ours.group(*columns), theirs.group(*columns))
