@@ -90,7 +90,7 @@ def outcomes(seed: int) -> Iterator[Outcome]:
             for way in ways:
                 how = f"{text} {way.get('loop', 'isolated')}"
                 try:
-                    system = path if random.random() < 0.5 or drawn.as_scenario else load(path)
+                    system = path if random.random() < 0.5 else load(path)
                     result = simulate(
                         system,
                         step=drawn.step,

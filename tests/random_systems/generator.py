@@ -172,7 +172,6 @@ class Drawn:
     """A system, with its parts in the order of the file.
 
     Attributes:
-        as_scenario: whether it is written as one.
         strong: whether values that go round its rings may grow.
 
     """
@@ -183,7 +182,6 @@ class Drawn:
     step: float
     start_time: float
     stop_time: float
-    as_scenario: bool
     strong: bool
 
 
@@ -252,7 +250,6 @@ class _Draw:
     def __init__(self, seed: int) -> None:
         self.random = Random(seed)
         self.seed = seed
-        self.as_scenario = self.random.random() < 0.12
         self.parts: dict[str, Part] = {}
         self.wires: list[Wire] = []
         # Shares of FMUs that compute outputs when asked, and of outputs with feedthrough.
@@ -290,12 +287,10 @@ class _Draw:
         slow = self.chance(0.1 if self.tight else 0.3)
         for part in self.parts.values():
             part.every = random.choice((1, 1, 2, 3)) if slow else 1
-        start = 0.0 if self.as_scenario else random.choice((0.0, 0.0, 0.0, 3.0, 1.1, -2.5))
+        start = random.choice((0.0, 0.0, 0.0, 3.0, 1.1, -2.5))
         steps = random.randint(3, 9) + (random.choice((0.0, 0.0, 0.5, 0.25)))
         stop = start + steps * step
-        return Drawn(
-            self.seed, self.parts, self.wires, step, start, stop, self.as_scenario, self.strong
-        )
+        return Drawn(self.seed, self.parts, self.wires, step, start, stop, self.strong)
 
     def _make_parts(self, n: int) -> None:
         random = self.random
@@ -322,7 +317,6 @@ class _Draw:
 
     def _fmu(self, name: str, kinds: list[str], quantities: list[str], declares: str) -> Fmu:
         random = self.random
-        end = ".v" if self.as_scenario else ""
         variables = []
         for causality, letter, most in (
             ("input", "u", 3),
@@ -333,9 +327,7 @@ class _Draw:
                 kind = random.choice(kinds if causality != "parameter" else ["Real", *kinds])
                 quantity = random.choice(quantities) if kind == "Real" else ""
                 unit = random.choice(QUANTITIES[quantity].units) if quantity else ""
-                if self.as_scenario and quantity:
-                    unit = QUANTITIES[quantity].units[0]
-                blank = Variable(f"{letter}{i}{end}", causality, kind, None, quantity, unit)
+                blank = Variable(f"{letter}{i}", causality, kind, None, quantity, unit)
                 start = None if causality == "output" else self._value(blank)
                 variables.append(Variable(blank.name, causality, kind, start, quantity, unit))
         capabilities = [
@@ -410,7 +402,7 @@ class _Draw:
                     (other, output)
                     for other in nearby
                     for output in self.parts[other].fmu.having("output")
-                    if _fits(output, variable, self.as_scenario)
+                    if _fits(output, variable)
                 ]
                 if sources:
                     other, output = random.choice(sources)
@@ -580,7 +572,7 @@ class _Draw:
 
     def _transform(self) -> None:
         """Transformations of connections."""
-        share = 0.0 if self.as_scenario else self.random.choice((0.0, 0.2, 0.5))
+        share = self.random.choice((0.0, 0.2, 0.5))
         for wire in self.wires:
             source = self.parts[wire.source[0]].fmu.named(wire.source[1])
             target = self.parts[wire.target[0]].fmu.named(wire.target[1])
@@ -603,13 +595,11 @@ class _Draw:
             wire.mapped = tuple((key, random.randint(1, 4)) for key in keys)
 
 
-def _fits(output: Variable, variable: Variable, same_unit: bool) -> bool:
+def _fits(output: Variable, variable: Variable) -> bool:
     if variable.kind in _COUNTED:
         return output.kind in _COUNTED
     if variable.kind == "Real" and output.kind == "Integer":
         return not variable.unit
-    if same_unit and output.unit != variable.unit:
-        return False
     return output.kind == variable.kind and output.quantity == variable.quantity
 
 
@@ -724,51 +714,11 @@ def description(fmu: Fmu) -> str:
 
 
 def write(drawn: Drawn, folder: Path) -> Path:
-    """A system as an archive, or as a scenario beside its FMUs."""
+    """Write a system as an archive."""
     fmus = {part.fmu.name: part.fmu for part in drawn.parts.values()}
     for name, fmu in fmus.items():
         model = {"model.txt": model_text(fmu)}
         small_fmus.write(folder / f"{name}.fmu", description(fmu), _SOURCE, resources=model)
-    if drawn.as_scenario:
-        return _scenario(drawn, folder)
-    return _archive(drawn, folder, list(fmus))
-
-
-def _scenario(drawn: Drawn, folder: Path) -> Path:
-    def port(end: tuple[str, str]) -> str:
-        return f'"{".".join(end).removesuffix(".v")}"'
-
-    def table(name: str, lines: list[str]) -> list[str]:
-        return ["", f"[{name}]", *lines] if lines else []
-
-    parts = drawn.parts.values()
-    values = [
-        f'"{part.name}.{name}" = {toml(part.fmu.named(name), value)}'
-        for part in parts
-        for name, value in part.values.items()
-    ]
-    lines = [
-        f"stop_time = {drawn.stop_time!r}",
-        f"step = {drawn.step!r}",
-        f"only = [{', '.join(repr(part.name) for part in parts)}]",
-        *table("components", [f'{part.name} = "{part.fmu.name}.fmu"' for part in parts]),
-        *table("wires", [f"{port(wire.target)} = {port(wire.source)}" for wire in drawn.wires]),
-        *table("parameters", values),
-        *table(
-            "steps",
-            [f"{part.name} = {part.every * drawn.step!r}" for part in parts if part.every > 1],
-        ),
-    ]
-    path = folder / "system.toml"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
-
-
-def toml(variable: Variable, value: Any) -> str:
-    return f'"{value}"' if variable.kind == "String" else literal(value)
-
-
-def _archive(drawn: Drawn, folder: Path, fmus: list[str]) -> Path:
     random = Random(drawn.seed)
     files: dict[str, str | Path] = {
         f"resources/{name}.fmu": folder / f"{name}.fmu" for name in fmus
