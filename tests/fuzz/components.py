@@ -175,7 +175,7 @@ Names = dict[str, str]
 
 
 class Component:
-    """One component on its way, from a seed."""
+    """A random component, from a seed."""
 
     def __init__(self, seed: int, rules: Mapping[str, Sequence[str]] = RULES) -> None:
         self._random, self._rules = Random(seed), rules
@@ -293,7 +293,7 @@ class Component:
 
 
 def names_of(owner: str, fields: Names) -> Names:
-    """The numbers in the fields of something, as they are written."""
+    """Expressions and types of all numbers in some fields."""
     found = {}
     for field, hint in fields.items():
         name = f"{owner}.{field}" if owner else field
@@ -302,14 +302,14 @@ def names_of(owner: str, fields: Names) -> Names:
 
 
 def function(head: str, lines: Sequence[str]) -> str:
-    """A function of the lines of its body."""
+    """Text of a function."""
     return (
         "\n".join([f"def {head}", '    """A hook."""', *(f"    {line}" for line in lines)]) + "\n"
     )
 
 
 def text_of(seed: int) -> str:
-    """The component of a seed; of an odd one with a type exchanged, or another mistake."""
+    """Script of a seed's component; an odd seed gives one with a mistake."""
     draw = Random(seed)
     module, function = draw.choice(HELPERS)
     text = Component(seed).text().replace("HELPER", module).replace("white_noise", function)
@@ -326,7 +326,7 @@ def text_of(seed: int) -> str:
 
 
 def files_of(seed: int) -> Mapping[str, str]:
-    """The texts of all files of the component of a seed."""
+    """Texts of all files of a seed's component."""
     module, function = Random(seed).choice(HELPERS)
     return {
         f"random_{seed}.py": text_of(seed),

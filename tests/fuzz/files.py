@@ -1,4 +1,4 @@
-"""Attack the command line with files that are not what they should be.
+"""Attack the command line with broken files.
 
 A valid file of each kind is mutated (:mod:`.files_mutators`) and handed to a command. Whatever it
 has become, the command ends with 0, or with 2 and one line; no exception leaves it; it writes only
@@ -48,7 +48,7 @@ SECONDS, BYTES, LETTERS = 20, 2 * 2**30, 5000
 
 
 class Finding(AssertionError):
-    """A command did with a file what it must not."""
+    """A command that mishandled a file."""
 
 
 class Overdue(BaseException):
@@ -79,7 +79,7 @@ class Kind:
 
 
 def kinds(run: Result) -> dict[str, Kind]:
-    """All kinds of files, each with a valid one; some need npm."""
+    """Kinds of files, each with a valid file; some need npm."""
     fmus = {
         # Descriptions need no code; a system of such FMUs can be read and written, not run.
         fmu.name: _zipped({"modelDescription.xml": _entries(fmu.read_bytes())[_DESCRIPTION]})
@@ -261,7 +261,7 @@ def _watch(event: str, arguments: tuple[Any, ...]) -> None:
 
 @contextmanager
 def _bounded(folder: str) -> Iterator[list[str]]:
-    """Bound time and memory, and list what is written outside the folders that may be."""
+    """Limit time and memory, and list files that are written outside the allowed folders."""
     global _watched  # noqa: PLW0603
     outside: list[str] = []
     soft, hard = resource.getrlimit(resource.RLIMIT_AS)

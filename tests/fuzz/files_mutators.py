@@ -24,7 +24,7 @@ NASTY = (
 
 
 def some_bytes(content: bytes, random: Random) -> bytes:
-    """Some bytes changed, left out, doubled, or the rest cut off."""
+    """Change, drop or double some bytes, or cut off the rest."""
     content = bytearray(content)
     for _ in range(random.choice((1, 1, 2, 8))):
         at = random.randrange(len(content) + 1)
@@ -93,7 +93,7 @@ def _put(rows: list[list[str]], row: int, column: int, text: str) -> None:
 
 
 def _written_otherwise(text: str, random: Random) -> str:
-    """The same number, or nearly, as another program may write it."""
+    """Write the same number, or nearly, as another program may write it."""
     try:
         number = float(text)
     except ValueError:
@@ -113,7 +113,7 @@ def _renamed(name: str, rows: list[list[str]], random: Random) -> str:
 
 
 def _wrong_column(rows: list[list[str]], column: int, random: Random) -> None:
-    """Every value of a column, and one of them none: such columns were dropped once."""
+    """Change every value of a column, one of them to invalid text."""
     for row in rows[1:]:
         _put([row], 0, column, "999")
     _put(rows, random.randrange(1, len(rows)), column, random.choice(NASTY))
@@ -224,7 +224,7 @@ def json(content: bytes, random: Random) -> bytes:
 
 
 def archive(content: bytes, random: Random) -> bytes:
-    """A zip archive with something wrong in its structure."""
+    """Break the structure of a zip archive."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as whole:
             entries = {name: whole.read(name) for name in whole.namelist()}

@@ -71,7 +71,7 @@ EVERY = (1, 1, 1, 2, 3, 4)
 
 
 def files_of(seed: int) -> Mapping[str, str]:
-    """The texts of all files of the component of a seed."""
+    """Texts of all files of a seed's component."""
     text = Component(seed, CALM).text().replace("HELPER", "helping_calm")
     text = text.replace("from pathlib", "from math import sin, sqrt\nfrom pathlib", 1)
     text = text.replace("> 3.0:", "> 0.5:")  # so that some runs are refused
@@ -82,7 +82,7 @@ def files_of(seed: int) -> Mapping[str, str]:
 
 
 class Made(NamedTuple):
-    """A component of a pool: what its author says, and its FMUs by their kinds."""
+    """A component of a pool: its definition, and its FMUs by their kinds."""
 
     definition: Definition
     fmus: Mapping[str, Path]
@@ -102,7 +102,7 @@ def pool(seeds: Sequence[int], folder: Path) -> list[Made]:
 
 
 class Drawn(NamedTuple):
-    """A system on paper.
+    """A system, its experiment, and the components that it needs.
 
     Attributes:
         parts: its components by their names, which are those of a pool.
@@ -135,7 +135,7 @@ def components(parts: Mapping[str, Made], kind: str) -> dict[str, Fmu]:
 
 
 def drawn(seed: int, made: Sequence[Made]) -> Drawn:
-    """The system of a seed, of components of a pool."""
+    """Draw a system of components of a pool."""
     draw = Random(seed)
     names = draw.sample(NAMES, draw.randint(2, 6))
     parts = {name: draw.choice(made) for name in names}
@@ -266,7 +266,7 @@ def run_of_program(text: Text, path: Path) -> Run:
 
 
 class Ways:
-    """The ways in which programs are made of the components of a pool."""
+    """Ways to make programs of the components of a pool."""
 
     def __init__(self, made: Sequence[Made], folder: Path) -> None:
         self._folder = folder
@@ -324,7 +324,7 @@ def outcomes(seed: int, systems: int = SYSTEMS) -> Iterator[Outcome]:
 
 
 def _forget(folder: Path) -> None:
-    """Let modules of a folder be imported from another."""
+    """Forget the modules of a folder, so that others may have their names."""
     place = str(folder.resolve())
     sys.path.remove(place)
     for name, known in [*sys.modules.items()]:
@@ -365,5 +365,5 @@ def difference(wanted: Run, found: Run, is_quick: bool = False) -> str:
 
 
 def findings(seed: int) -> list[str]:
-    """List what differs in the systems of a pool."""
+    """List the differences in the systems of a pool."""
     return [f"{one.system}: {line}" for one in outcomes(seed) for line in one.findings]

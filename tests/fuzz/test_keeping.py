@@ -149,7 +149,7 @@ folders = st.builds(
 
 @pytest.fixture(autouse=True)
 def _no_module_of_that_name() -> None:
-    """Other tests have one, for which `new` would refuse the name."""
+    """Forget modules of other tests, for which `new` would refuse the name."""
     sys.modules.pop("own", None)
 
 
@@ -168,7 +168,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def quick(here: Path) -> Iterator[None]:
-    """Without what takes seconds and writes elsewhere: compilers, processes, most of a report."""
+    """Replace slow steps that write elsewhere: compilers, processes, most of a report."""
 
     def copied(module: str, folder: Path, *options: str, **_: object) -> list[Path]:
         source = current_fmus() if module == "build" else here / "own"
@@ -224,7 +224,7 @@ def snapshot(folder: Path) -> dict[str, bytes | str]:
 
 
 def fill(folder: Path, outside: Path, what: Folder) -> None:
-    """Put files and links of the user's where nothing else is."""
+    """Write the user's files and links where no other files are."""
     for name, content in what.files.items():
         path = folder / name
         if not os.path.lexists(path) and not path.name.startswith("/"):
@@ -242,7 +242,7 @@ def fill(folder: Path, outside: Path, what: Folder) -> None:
 
 
 def call(arguments: list[str]) -> tuple[int, str]:
-    """Exit status of a command, and what it says."""
+    """Exit status of a command, and its errors."""
     said = StringIO()
     with redirect_stderr(said), redirect_stdout(StringIO()):
         status = main(arguments)
@@ -313,7 +313,7 @@ def test_every_file_of_the_users_stays(here: Path, name: str):
 
 
 def flipped(folder: Path, place: float, bit: int) -> str:
-    """Change a bit of the files below a folder; the name of the file."""
+    """Change a bit of the files below a folder, and return the name of the file."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.stat().st_size)
     # Each file as often as any other, however long it is.
     share, file = modf(place * len(files))
@@ -364,7 +364,7 @@ TIMES = re.compile(rb'"(started|seconds|command|resumed_at)": .*|Written by .*')
 
 
 def made(folder: Path) -> dict[str, bytes]:
-    """The files of a folder without times, without ledgers and what was being written."""
+    """The files of a folder without times, ledgers and unfinished files."""
     found = {name: TIMES.sub(b"", content) for name, content in contents(folder).items()}
     return {name: found[name] for name in found if not name.startswith(".auv-fmu-")}
 

@@ -1,4 +1,4 @@
-"""Runs of random systems beside what they must show."""
+"""Runs of random systems, compared with an independent evaluator."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def outcomes(seed: int) -> Iterator[Outcome]:
 
 
 def findings(seed: int) -> list[str]:
-    """List the runs of a system that are not as they must be."""
+    """List the runs of a system that differ or are refused."""
     wrong = (one for one in outcomes(seed) if one.what not in (EQUAL, UNDECIDED))
     return [f"{one.how}: {one.what}: {one.why}" for one in wrong]
 
@@ -125,7 +125,7 @@ def findings(seed: int) -> list[str]:
 def difference(
     result: Result, rows: Sequence[dict[str, Any]], tolerance: float = TOLERANCE
 ) -> str | None:
-    """The first value that is not what it must be, in words."""
+    """Describe the first value that differs; None: there is none."""
     for name in rows[0]:
         found, wanted = result[name][: len(rows)], [row[name] for row in rows]
         if isinstance(wanted[0], float):

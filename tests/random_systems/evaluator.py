@@ -94,7 +94,7 @@ def typed(variable: Variable, value: Any) -> Any:
 
 
 class Machine:
-    """A component at work."""
+    """A component during a run."""
 
     def __init__(self, part: Part, start_time: float) -> None:
         self.fmu, self.time = part.fmu, start_time
@@ -167,7 +167,7 @@ def default_order(drawn: Drawn) -> str:
 
 
 def components(nodes: Sequence[Any], edges: Iterable[tuple[Any, Any]]) -> list[list[Any]]:
-    """The strongly connected components of a graph, what feeds others before them."""
+    """Strongly connected components of a graph, sources first."""
     reach = reached(nodes, edges)
     left = [{node} | {other for other in reach[node] if node in reach[other]} for node in nodes]
     groups = [sorted(group, key=nodes.index) for group in left]
@@ -318,7 +318,7 @@ class Evaluation:
     # Values
 
     def _hand(self, wire: Wire, value: Any) -> Any:
-        """Let an input take a value, and say what arrived."""
+        """Set an input, and return the value that arrived."""
         arrived = arriving(self.drawn, wire, value)
         self.machines[wire.target[0]].values[wire.target[1]] = arrived
         return arrived
@@ -363,7 +363,7 @@ class Evaluation:
         self._newton(wires)
 
     def _round(self, wires: Sequence[Wire]) -> float:
-        """One after the other; the largest change, as a share."""
+        """Hand values along the wires once, and return the largest relative change."""
         most = 0.0
         for wire in wires:
             machine, port = self.machines[wire.target[0]], wire.target[1]
@@ -490,7 +490,7 @@ class Evaluation:
         return all(found)
 
     def _run_in_feedthrough_order(self, shown: dict[Port, Any]) -> None:
-        """Steps, each to a time at which every input takes what feeds it then."""
+        """Make steps; after each, every input takes the value that feeds it at that time."""
         parts, spans = self.drawn.parts, self._steps()
         for wire in self.drawn.wires:
             if self._feedthrough(wire) and self._is_flat(wire.source[0]):

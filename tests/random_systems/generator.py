@@ -1,4 +1,4 @@
-"""Systems out of a seed, and the archives that they are written in.
+"""Systems from a seed, and their archives.
 
 All Reals stand for a number of the size of one, in a unit of their own: whatever a chain of units
 and transformations makes of them, loops have the gain that their formulas are drawn with.
@@ -186,7 +186,7 @@ class Drawn:
 
 
 def leaves(formula: Formula) -> list[Formula]:
-    """The ends of a formula: what it is computed from."""
+    """The leaves of a formula: numbers, variables, states and the time."""
     if formula[0] in ("number", "text", "input", "parameter", "state", "time", "length"):
         return [formula]
     return [leaf for operand in formula[1:] for leaf in leaves(operand)]
@@ -245,7 +245,7 @@ def in_unit(variable: Variable, formula: Formula) -> Formula:
 
 
 class _Draw:
-    """One system in the making."""
+    """A system while it is drawn."""
 
     def __init__(self, seed: int) -> None:
         self.random = Random(seed)
@@ -348,7 +348,7 @@ class _Draw:
         )
 
     def _value(self, variable: Variable) -> Any:
-        """Something that an input or a parameter can be."""
+        """A value for an input or a parameter."""
         random = self.random
         match variable.kind:
             case "Real":
@@ -365,7 +365,7 @@ class _Draw:
                 return 1 if variable.causality == "input" else random.randint(1, 4)
 
     def _wire(self, style: str) -> None:
-        """Feed inputs; which outputs are near is the shape of the system."""
+        """Feed inputs from outputs; the style decides which outputs are near."""
         random = self.random
         names = list(self.parts)
         random.shuffle(names)

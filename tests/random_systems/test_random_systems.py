@@ -1,4 +1,4 @@
-"""Random systems show what they must; `python -m fuzz random_systems` runs thousands of them."""
+"""Random systems have the evaluator's rows; `python -m fuzz random_systems` runs thousands."""
 
 from __future__ import annotations
 

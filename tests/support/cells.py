@@ -357,7 +357,7 @@ class Trial:
 
 
 def _content(host: Host) -> object:
-    """The state without `fault`; None where it cannot be read."""
+    """The state without `fault`; None if it cannot be read."""
     return states.without_fault(host.content())
 
 
@@ -370,7 +370,7 @@ def _same(variable: Variable, found: object, wanted: object) -> bool:
 
 @contextmanager
 def _location(library: Library, case: str) -> Iterator[dict[str, Any]]:
-    """Folders that are not what a resource location should be."""
+    """Make a folder with invalid resources."""
     resources = library.folder / "resources"
     with TemporaryDirectory(prefix="auv_fmu_resources_") as folder:
         made = Path(folder, "resources")

@@ -43,7 +43,7 @@ _NO_EXPERIMENT = (0, c_double(0.0), c_double(0.0), 0, c_double(0.0))
 
 
 def read_description(folder: Path) -> Description:
-    """modelDescription.xml in the words of FMI 2.0; the time is one more variable."""
+    """modelDescription.xml, with the names of FMI 2.0; the time is an additional variable."""
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     implementation, variables = root.find("CoSimulation"), root.find("ModelVariables")
     assert implementation is not None and variables is not None
@@ -82,7 +82,7 @@ class Fmi3Library(Library):
 
 
 class _Functions:
-    """Has fmi2DoStep and the others as attributes."""
+    """Functions of FMI 2.0 as attributes, made of functions of FMI 3.0."""
 
     def __init__(self, library: CDLL, enumerations: Container[int]) -> None:
         self._library = library

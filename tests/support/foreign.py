@@ -1,4 +1,4 @@
-"""FMUs that are not ours and misbehave: one in C, and one of PythonFMU's own making."""
+"""FMUs that misbehave: one in C, and one from PythonFMU's own builder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tests' hosts in C, where they find nothing, and under sanitizers with FMUs in C."""
+"""The tests' hosts in C, in a bare root folder, and under sanitizers with FMUs in C."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def arguments_of(folder: Path) -> list[str]:
 
 
 def unpacked(fmus: Path, folder: Path, names: Sequence[str] = NAMES) -> list[str]:
-    """The same of every FMU, or of some."""
+    """Libraries and resource locations of all FMUs, or of some, as arguments of a host."""
     places = [Path(fmpy.extract(fmus / f"{name}.fmu", folder / name)) for name in names]
     return [argument for place in places for argument in arguments_of(place)]
 
 
 def libraries_of(binary: Path) -> list[Path]:
-    """The shared libraries that a binary is linked against, the loader too."""
+    """The shared libraries that a binary is linked against, and the dynamic loader."""
     said = subprocess.run(["ldd", binary], check=True, capture_output=True, text=True).stdout
     return [Path(word) for word in said.split() if word.startswith("/")]
 
@@ -93,7 +93,7 @@ def sanitize(folder: Path, what: str = MEMORY) -> Path:
 
 
 def sanitized(shared: Path, fmus: Path, name: str, what: str = MEMORY) -> Path:
-    """An FMU in C, unpacked and compiled so once for all workers."""
+    """An FMU in C, unpacked and compiled with sanitizers once for all workers."""
     folder = shared / what / name
     with hold_lock(shared, wait=True):
         if not folder.exists():

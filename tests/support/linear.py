@@ -184,7 +184,7 @@ def system_of(
 def exact(
     parts: Mapping[str, Part], wires: Mapping[str, str], times: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """All outputs of the coupled system, whose inputs are at all times what feeds them.
+    """Outputs of the coupled system, whose inputs equal their sources at all times.
 
     x' = A x + B u, y = C x + D u, u = L y, so u = (1 - L D)^-1 L C x; by eigenvalues, or, where a
     matrix has too few eigenvectors, by its exponential series.

@@ -334,7 +334,7 @@ class Host:
         return value
 
     def _read(self, arrays: _Arrays) -> list[Any]:
-        """Values of variables; None each, where there are no outputs since there is no start."""
+        """Values of variables; all None if there are no outputs for lack of a start."""
         status = self.call(f"fmi2Get{arrays.type}", arrays.references, arrays.n, arrays.values)
         if status == Status.Error:
             return [None] * len(arrays.names)
@@ -404,7 +404,7 @@ def instance(library: Library, **arguments: Any) -> Iterator[Host]:
 
 @contextmanager
 def initialised(library: Library, **arguments: Any) -> Iterator[Host]:
-    """An instance that can step, and has said nothing yet."""
+    """An instance that can step, without messages."""
     with instance(library, **arguments) as host:
         assert host.setup() == host.enter() == host.exit() == Status.OK
         host.messages.clear()

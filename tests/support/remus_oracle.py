@@ -120,7 +120,7 @@ def table(name: str) -> list[Row]:
 
 
 def to_si(values: tuple[float, ...]) -> tuple[float, float, float]:
-    """A command, or what it comes to, with the speed of the propeller in rad/s."""
+    """A command, or an actuator's state, with the speed of the propeller in rad/s."""
     delta_r, delta_s, n = values
     return delta_r, delta_s, n * pi / 30.0
 

@@ -33,7 +33,7 @@ EACH = [*REPRESENTATIVES, *slow(*(name for name in NAMES if name not in REPRESEN
 
 
 class Setting(NamedTuple):
-    """Values that a case needs, each of which is good, and values with which all is well again."""
+    """Values that a case needs, each good on its own, and values with which the run continues."""
 
     values: Mapping[str, float]
     good: Mapping[str, float]

@@ -1,4 +1,4 @@
-"""Serialised states of both kinds, and how they are made ones to be refused."""
+"""Serialised states of both kinds, and changes that an FMU must refuse."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small components whose hooks take what is asked for."""
+"""Small components whose hooks take given arguments."""
 
 from __future__ import annotations
 
