@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def libraries(folder: Path) -> Sequence[Library]:
-    """In Python, in C, and in C of FMI 3.0."""
+    """The FMUs in Python, in C, and in C of FMI 3.0."""
     return (
         Library(build.python(folder / "python")),
         Library(build.native(folder / "native")),
@@ -114,7 +114,7 @@ class Run:
 
 
 def both(folder: Path, variant: str) -> Sequence[Library]:
-    """The same with outputs that are computed at other times, in Python and in C."""
+    """A variant whose outputs are computed at other times, in Python and in C."""
     made = build.native(folder / variant, of=build.definition(variant))
     return Library(build.python(folder / f"{variant}_python", variant)), Library(made)
 
@@ -261,7 +261,7 @@ def test_integers_and_truth_values_can_be_read_as_reals(stepping):
 
 
 def test_outputs_before_the_run_follow_every_set_value(runs):
-    """Whatever they are read as; and there are none where there is no start."""
+    """With any type of get call; and there are no outputs without a start."""
     for run in runs:
         run.note(run.host.setup())
         run.note(run.host.enter())
@@ -317,7 +317,7 @@ def measured(parameters: Parameters, n: float, y: float) -> float:
 
 
 def test_scalars_are_groups_of_their_own_with_noise_and_ranges(tmp_path, monkeypatch):
-    """A Real input in a range is looked at, also where all are set in one call."""
+    """A Real input in a range is checked, also if all are set in one call."""
     (tmp_path / "scalars.py").write_text(SCALARS)
     monkeypatch.syspath_prepend(tmp_path)
     module = import_module("scalars")
@@ -383,7 +383,7 @@ def outputs(state: State) -> Outputs:
 
 
 def test_an_int_may_be_a_member_or_a_truth_value_but_a_member_no_other_int(tmp_path, monkeypatch):
-    """A state that an FMU gives is one that it takes; any other is refused as a step."""
+    """An FMU takes its own states; a step to any other is refused."""
     (tmp_path / "members.py").write_text(MEMBERS)
     monkeypatch.syspath_prepend(tmp_path)
     module = import_module("members")
@@ -502,7 +502,7 @@ def test_run_continues_from_the_bytes_of_its_state(variants, first, then):
 
 
 def changed(content: bytes, place: Sequence[Any], value: Any) -> bytes:
-    """A state of the kind in Python in which one value is another one."""
+    """A state of the kind in Python with one other value."""
     said = json.loads(content)
     part = said
     for key in place[:-1]:

@@ -223,7 +223,7 @@ def test_connecting_terminals_by_name_wires_the_closed_loop():
 def test_starts_and_bounds_are_the_declared_ones_and_can_be_set(
     dist: Path, native: Path, tmp_path: Path, name: str
 ):
-    """Each to the bit, and at its bounds, where a text with fewer digits may lie beyond."""
+    """To the bit, and at the bounds, which a text with fewer digits may exceed."""
     ports = {port.name: port for port in ports_of(name)}
     for kind, fmus in ((PYTHON, dist), (NATIVE, native)):
         library = Library(Path(fmpy.extract(str(fmus / f"{name}.fmu"), tmp_path / kind)))

@@ -325,7 +325,7 @@ def test_time_is_a_variable(plant: Fmi3Library):
 
 
 def test_categories_are_turned_on_and_off_one_by_one(unpacked: Path):
-    """The restart of the observer is told as a warning; errors are told in any case."""
+    """The restart of the observer is a warning; errors are logged in any case."""
     controller = Fmi3Library(unpacked / "ObserverController")
     measured = controller.description.find("y.x").reference
     warning, discard, error = Status.Warning, Status.Discard, Status.Error

@@ -186,7 +186,7 @@ def test_folder_without_a_slave_is_null_with_one_message(python, resources, file
 
 
 def test_long_reason_is_cut_between_characters(python, resources):
-    """And a percent sign is doubled, as in all formats."""
+    """Percent signs are doubled, as in all formats."""
     (resources / "slavemodule.txt").write_text("guarded_k")
     said = "100 % %d %% " + "ü" * 2000
     (resources / "guarded_k.py").write_text(f"raise ValueError({said!r})", encoding="utf-8")
@@ -283,7 +283,7 @@ REFUSED = [
 def test_refusals_are_told_once_and_only_errors_with_logging_off(
     of_any_version: Library, status, call, logging
 ):
-    """Each in its call, and answered again where it is not told again."""
+    """Each in its call; a repeated one has the same answer and no message."""
     with initialised(of_any_version, logging=logging) as host:
         assert [call(host), call(host)] == [status] * 2
         said = [(message.status, message.category) for message in host.messages]
@@ -323,7 +323,7 @@ def test_sum_of_steps_reaches_the_stop_time_and_no_step_goes_beyond(
 def test_of_several_values_all_are_taken_or_none(
     host: Host, bad: str | None, value: float, answer: Status, place: int
 ):
-    """An input and a tunable parameter beside a value that may be bad, wherever it stands."""
+    """An input, a tunable parameter and a value that may be bad, in any order."""
     good = [reference(host, "y.x"), reference(host, "k_d")]
     before, given = host.get("Real", good), [0.5, 60.0]
     references, values = [*good], [*given]
@@ -362,7 +362,7 @@ def test_handle_of_another_fmu_is_told_from_ones_own(host: Host, planner: Librar
 
 
 def test_handle_is_given_once(host: Host):
-    """Whatever is freed in between, and with more alive than a table begins with."""
+    """Also after others were freed, and with more than a table begins with."""
     handles = [host.component]
     for _ in range(100):
         with instance(host.library) as other:
@@ -384,7 +384,7 @@ def test_states_end_with_their_instance(host: Host):
 
 
 def test_state_that_is_given_is_used_again(host: Host):
-    """And holds what it is now."""
+    """It holds the present values."""
     first = c_void_p()
     assert host.call("fmi2GetFMUstate", byref(first)) == OK
     before = first.value
@@ -422,7 +422,7 @@ def test_logger_that_calls_back_is_refused(host: Host, capfd):
 
 
 def test_messages_of_a_call_are_told_in_their_order(host: Host):
-    """Also where the logger calls back, which changes no value of the call."""
+    """Also if the logger calls back, which changes no value of the call."""
     unknown = range(UNKNOWN, UNKNOWN + 5)
     answers = []
     host.when_told = lambda: answers.append(host.step(0.0, 0.02))

@@ -34,7 +34,7 @@ pytestmark = needs_compiler
 
 
 def preloaded(folder: Path, text: str) -> str:
-    """A library that is put before the C library's functions."""
+    """A library that replaces functions of the C library."""
     source = folder / "preloaded.c"
     source.write_text(f"#define _GNU_SOURCE\n{text}")
     command = [str(machines_compiler()), "-shared", "-fPIC"]
@@ -198,7 +198,7 @@ int dl_iterate_phdr(int (*callback)(struct dl_phdr_info *, size_t, void *), void
 
 @needs_libpython
 def test_python_that_a_host_has_for_itself_is_used(dist: Path, tmp_path: Path):
-    """And no library is loaded while the dynamic linker goes through them."""
+    """No library is loaded while the dynamic linker goes through them."""
     program, shim = host(tmp_path, "host"), preloaded(tmp_path, PRIVATE_PYTHON)
     arguments = unpacked(dist, tmp_path, NAMES[:1])
     process = run(program, *arguments, LD_PRELOAD=shim, LIBPYTHON=str(LIBPYTHON))

@@ -45,7 +45,7 @@ def python(tree: Path, *arguments: str) -> str:
 
 @pytest.fixture(scope="module")
 def tree(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A copy of the tree with another component, and but one of those that it has."""
+    """A copy of the tree with a new component and one of the others."""
     tree = tmp_path_factory.mktemp("tree")
     left_out = [package.split(".")[1] for package in components().values() if package != OTHER]
     ignored = shutil.ignore_patterns("__pycache__", "dist", *left_out)

@@ -65,7 +65,7 @@ Try = Callable[[str, str, Key, Sequence[str]], dict[str, str]]
 
 
 def states_of(key: Key) -> list[str]:
-    """The states that a row holds in; one without a name for a row that is about no instance."""
+    """The states of a row; one without a name for a row without an instance."""
     return [*rows()[key].cells] if key in rows() else [""]
 
 

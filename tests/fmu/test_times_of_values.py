@@ -1,4 +1,4 @@
-"""Values belong to their time: what a get shows after inputs and after steps, in both kinds."""
+"""Values belong to their time: get calls after inputs and after steps, in both kinds."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def test_sample_that_is_refused_is_a_refused_step_and_changes_nothing(sampled: L
 
 @pytest.mark.parametrize("serialised", [False, True])
 def test_restored_instance_holds_its_sample(sampled: Library, serialised: bool):
-    """And takes another one in the next step."""
+    """It takes another one in the next step."""
     with initialised(sampled) as host, initialised(sampled) as other:
         assert host.step(0.0, 0.5) == Status.OK
         state = host.get_state()

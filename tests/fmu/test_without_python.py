@@ -73,7 +73,7 @@ def hold(
     experiment: Experiment,
     tolerance: float = 0.0,
 ) -> None:
-    """Hold each component of a system, run by a host in C, against a run here.
+    """Compare each component of a system, run by a host in C, with a run here.
 
     Args:
         system: of the FMUs.

@@ -1,4 +1,4 @@
-"""Messages between vehicles: when they arrive, which are lost, what the receiver knows."""
+"""Messages between vehicles: times of arrival, losses, and the receiver's knowledge."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""References in a formation: places, heading, exact derivatives, and what is refused."""
+"""References in a formation: places, heading, exact derivatives, and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The reference through waypoints: what it is, how smooth, and which paths are refused."""
+"""The reference through waypoints: its definition, its smoothness, and refused paths."""
 
 from __future__ import annotations
 

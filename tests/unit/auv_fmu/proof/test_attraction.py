@@ -1,4 +1,4 @@
-"""(33), (40), (42) and (47): what the theorems cover at most."""
+"""(33), (40), (42) and (47): the largest region that the theorems cover."""
 
 import numpy as np
 import pytest

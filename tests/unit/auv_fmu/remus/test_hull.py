@@ -1,4 +1,4 @@
-"""The hull of the REMUS 100: against what mechanics and Lamb say."""
+"""The hull of the REMUS 100, compared with mechanics and Lamb."""
 
 from __future__ import annotations
 

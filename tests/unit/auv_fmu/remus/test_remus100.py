@@ -1,4 +1,4 @@
-"""The REMUS 100: against PythonVehicleSimulator, and against what mechanics says."""
+"""The REMUS 100, compared with PythonVehicleSimulator and with mechanics."""
 
 from __future__ import annotations
 

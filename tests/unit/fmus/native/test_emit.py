@@ -778,7 +778,7 @@ def test_python_and_c_agree_bit_for_bit(
 def test_no_element_of_a_temporary_value_is_read(
     twins: dict[str, Twins], tmp_path_factory: pytest.TempPathFactory
 ):
-    """C99, 6.5.2.2: the result of a function, after the next sequence point."""
+    """C99, 6.5.2.2: a function's result ends with the next sequence point."""
     text = twins_of(twins, COMPILED, tmp_path_factory).text
     assert not re.search(r"\)(\.\w+)*\.v\[", text)
 
@@ -982,7 +982,7 @@ def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):
 
 
 def test_a_choice_of_many_is_written_side_by_side():
-    """In a thread, whose stack is empty."""
+    """A thread has an empty stack."""
     x = tree.Local("x", FLOAT)
     body: list[tree.Statement] = [tree.Return(x)]
     for k in range(900):
@@ -996,7 +996,7 @@ def test_a_choice_of_many_is_written_side_by_side():
 
 
 def test_variables_are_declared_in_the_order_of_their_first_use(tmp_path: Path):
-    """In each process: the GUID of an FMU follows from its text."""
+    """The GUID of an FMU follows from its text, which must be the same in each process."""
     names = "qwertyuiop"
     stores = [f"{name} = {i}.0 * x" for i, name in enumerate(names)]
     text = HEAD + (

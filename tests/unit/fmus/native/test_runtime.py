@@ -135,7 +135,7 @@ def test_numbers_are_written_as_python_writes_them(runtime: Runtime, number: flo
 
 
 def test_powers_of_two_are_written_as_python_writes_them(runtime: Runtime):
-    """Below one numbers lie closer than above it, and other digits may be the fewest."""
+    """Below a power of two, numbers are closer than above it, and the fewest digits differ."""
     for number in POWERS_OF_TWO:
         assert runtime.shown(number, exactly=True) == repr(number)
 

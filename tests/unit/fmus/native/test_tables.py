@@ -1,4 +1,4 @@
-"""The tables of ports and of the state in C, for what the components of the bundle do not have."""
+"""The tables of ports and of the state in C, for types that the bundle lacks."""
 
 from __future__ import annotations
 

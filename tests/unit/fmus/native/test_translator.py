@@ -79,7 +79,7 @@ FLAGS = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror", "-Wno-unused-fu
 
 
 def drawn_type(random: Random, depth: int = 0) -> Any:
-    """Something that `measured` may take its draws as: numbers in parts of any kind."""
+    """A type for the draws of `measured`: numbers in parts of any kind."""
     kind = random.randrange(3 if depth > 2 else 6)
     if kind < 3:
         sizes = random.randint(1, 3), random.randint(1, 3)

@@ -1,4 +1,4 @@
-"""PathPlanner: the corner ahead, which goes along in the state."""
+"""PathPlanner: the corner ahead, which is part of the state."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A component is what its modules say: one module says it all."""
+"""The definition of a component, from one module."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""modelDescription.xml of a few ports, beside what FMI 2.0 asks for them."""
+"""modelDescription.xml of a few ports, compared with FMI 2.0."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Units are products of SI symbols; one that is none is a name only."""
+"""Units are products of SI symbols; any other unit is only a name."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def test_infinities_that_cancel_are_found():
     ],
 )  # fmt: skip
 def test_wrong_parameter_is_an_error_before_the_run(name, parameter, value):
-    """There are hosts that ignore fmi2Discard: they would run with the value before."""
+    """Some hosts ignore fmi2Discard: they would run with the earlier value."""
     driver = ClassInstance(name, **{parameter: value})
     dotted = parameter.replace("__", ".")
     [port] = [port for port in driver.ports if port.name == dotted]
@@ -60,7 +60,7 @@ def test_without_a_loader_no_step_is_made_with_another_value():
 
 
 def test_integers_and_truth_values_can_be_read_as_numbers(driver):
-    """There are hosts that read all outputs with fmi2GetReal."""
+    """Some hosts read all outputs with fmi2GetReal."""
     for reference, port in enumerate(driver.ports):
         [number] = driver.slave.get_real([reference])
         assert type(number) is float
@@ -163,7 +163,7 @@ def test_largest_noise_leaves_the_largest_position_finite():
 
 
 def test_noise_of_a_refused_step_is_not_lost():
-    """y after a refused step is y without it: the same numbers are drawn."""
+    """y after a refused step equals y without it: the same numbers are drawn."""
     driver, calm = ClassInstance("AuvPlant"), ClassInstance("AuvPlant")
     driver.set(tau_w__p=1e300)
     driver.step()

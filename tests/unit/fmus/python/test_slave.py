@@ -1,4 +1,4 @@
-"""A slave of a component as small as can be, dx/dt = gain a, seen as b; and how slaves are made."""
+"""A slave of a component of one equation, dx/dt = gain a, with the output b."""
 
 from __future__ import annotations
 
