@@ -1,4 +1,4 @@
-/* A host that is no Python program: instantiates all given FMUs side by side, steps them, saves,
+/* A host written in C: instantiates all given FMUs side by side, steps them, saves,
  * restores and serialises their state, and frees them.
  *
  * usage: host LIBRARY RESOURCES [LIBRARY RESOURCES ...]

@@ -1,4 +1,4 @@
-/* A host that is no Python program: gives an FMU the inputs of a run that others have made, and
+/* A host written in C: gives an FMU the inputs of a run that others have made, and
  * writes its outputs.
  *
  * usage: replay LIBRARY GUID RESOURCES < WHAT

@@ -29,7 +29,7 @@ from support.raw import Host, Library, Status, initialised, instance
 
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler")
 
-#: Where an exception was raised, which only the kind in Python knows.
+#: File and line of an exception, which only the kind in Python has.
 _LINE = re.compile(r"component\.py:\d+: ")
 
 MOST, LEAST = 2**31 - 1, -(2**31)
@@ -45,7 +45,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def libraries(folder: Path) -> Sequence[Library]:
-    """In Python, in C, and in C of FMI 3.0."""
+    """The FMUs in Python, in C, and in C of FMI 3.0."""
     return (
         Library(build.python(folder / "python")),
         Library(build.native(folder / "native")),
@@ -58,7 +58,7 @@ def bits(value: Any) -> Any:
 
 
 class Run:
-    """An instance by the names of its ports, and all that it has answered."""
+    """An instance by the names of its ports, and its answers so far."""
 
     def __init__(self, host: Host) -> None:
         self.host = host
@@ -87,7 +87,7 @@ class Run:
         return values
 
     def start(self) -> None:
-        self.host.setup()  # which FMI 3.0 does not have
+        self.host.setup()  # no function of FMI 3.0
         for call in (self.host.enter, self.host.exit):
             self.note(call())
 
@@ -114,7 +114,7 @@ class Run:
 
 
 def both(folder: Path, variant: str) -> Sequence[Library]:
-    """The same with outputs that are computed at other times, in Python and in C."""
+    """A variant whose outputs are computed at other times, in Python and in C."""
     made = build.native(folder / variant, of=build.definition(variant))
     return Library(build.python(folder / f"{variant}_python", variant)), Library(made)
 
@@ -149,7 +149,7 @@ def stepping(libraries) -> Iterator[list[Run]]:
 
 
 def answers_agree(runs: Sequence[Run]) -> None:
-    """Of both kinds all; FMI 3.0 has other words in some messages."""
+    """Compare all answers of both kinds; FMI 3.0 has other words in some messages."""
     one, other, *third = (run.answers for run in runs)
     assert one == other
     for answers in third:
@@ -173,7 +173,7 @@ def test_inputs_start_where_they_are_said_to(runs):
     answers_agree(runs)
 
 
-def test_numbers_choose_members_and_all_parameters_lie_where_the_equations_have_them(runs):
+def test_numbers_choose_members_and_all_parameters_reach_the_equations(runs):
     for run in runs:
         run.set("Integer", **{"mode": -7, "limits.kind": 2})
         run.set("Integer", **{"step": -3, "mixed.n": 17, "limits.most": 9})
@@ -217,7 +217,7 @@ def test_what_seed_and_noise_raise_is_said_in_both_kinds(libraries):
             answers_agree(runs)
 
 
-def test_state_that_is_wild_is_restarted_with_all_that_is_derived(stepping):
+def test_wild_state_is_restarted_with_its_derived_values(stepping):
     for run in stepping:
         run.set("Real", u=1e9)
         assert run.step() == run.step() == run.step() == Status.OK
@@ -242,7 +242,7 @@ def test_state_that_is_wild_is_restarted_with_all_that_is_derived(stepping):
         ("Integer", {"go": 1}, Status.Error, "no Integer has the value reference 2"),
     ],
 )  # fmt: skip
-def test_what_is_no_value_of_a_port_is_refused_whole(stepping, kind, values, status, why):
+def test_values_that_no_port_takes_are_refused_as_a_whole(stepping, kind, values, status, why):
     for run in stepping:
         before = run.look()
         assert run.set_all(kind, values) == status
@@ -260,8 +260,8 @@ def test_integers_and_truth_values_can_be_read_as_reals(stepping):
     answers_agree(stepping)
 
 
-def test_outputs_before_the_run_follow_all_that_is_set(runs):
-    """Whatever they are read as; and there are none where there is no start."""
+def test_outputs_before_the_run_follow_every_set_value(runs):
+    """With any type of get call; and there are no outputs without a start."""
     for run in runs:
         run.note(run.host.setup())
         run.note(run.host.enter())
@@ -279,7 +279,7 @@ def test_outputs_before_the_run_follow_all_that_is_set(runs):
     answers_agree(runs)
 
 
-#: Numbers that are no tuples, as ports, as groups, and with noise.
+#: Single numbers as ports, as groups, and with noise.
 SCALARS = """\
 from __future__ import annotations
 
@@ -317,7 +317,7 @@ def measured(parameters: Parameters, n: float, y: float) -> float:
 
 
 def test_scalars_are_groups_of_their_own_with_noise_and_ranges(tmp_path, monkeypatch):
-    """A Real input in a range is looked at, also where all are set in one call."""
+    """A Real input in a range is checked, also if all are set in one call."""
     (tmp_path / "scalars.py").write_text(SCALARS)
     monkeypatch.syspath_prepend(tmp_path)
     module = import_module("scalars")
@@ -383,7 +383,7 @@ def outputs(state: State) -> Outputs:
 
 
 def test_an_int_may_be_a_member_or_a_truth_value_but_a_member_no_other_int(tmp_path, monkeypatch):
-    """A state that an FMU gives is one that it takes; any other is refused as a step."""
+    """An FMU takes its own states; a step to any other is refused."""
     (tmp_path / "members.py").write_text(MEMBERS)
     monkeypatch.syspath_prepend(tmp_path)
     module = import_module("members")
@@ -423,7 +423,7 @@ calls = st.one_of(
     st.tuples(
         st.just("set_all"), st.just("Integer"), some((*INTEGERS, "step", "n", "mixed.n"), numbers)
     ),
-    # Of its own: FMI 3.0 has another call for enumerations.
+    # Apart from the others: FMI 3.0 has another call for enumerations.
     st.tuples(st.just("set_all"), st.just("Integer"), some(("want",), numbers)),
     st.tuples(st.just("set_all"), st.just("Boolean"), some(("go", "counts"), st.booleans())),
     st.tuples(
@@ -477,7 +477,7 @@ def test_both_kinds_answer_alike_whatever_is_called(variants, before, after):
 
 
 @given(first=st.lists(calls, max_size=8), then=st.lists(calls, min_size=1, max_size=8))
-def test_run_goes_on_from_the_bytes_of_its_state_as_if_nothing_had_been(variants, first, then):
+def test_run_continues_from_the_bytes_of_its_state(variants, first, then):
     for library in variants:
         with initialised(library) as host, initialised(library) as another:
             one, other = Run(host), Run(another)
@@ -502,7 +502,7 @@ def test_run_goes_on_from_the_bytes_of_its_state_as_if_nothing_had_been(variants
 
 
 def changed(content: bytes, place: Sequence[Any], value: Any) -> bytes:
-    """A state of the kind in Python in which one value is another one."""
+    """A state of the kind in Python with one other value."""
     said = json.loads(content)
     part = said
     for key in place[:-1]:

@@ -120,7 +120,7 @@ def test_no_run_begins_with_another_parameter(dist, tmp_path, name, parameter, v
 
 
 def test_many_instances_leave_the_interpreter_as_it_was(dist: Path, tmp_path: Path):
-    """What PythonFMU takes too often is given back, what it never frees is freed."""
+    """References that PythonFMU takes too often are given back, and leaks are freed."""
     fmpy.extract(dist / "MotionPlanner.fmu", unzipdir=tmp_path)
 
     def come_and_go(times: int) -> None:
@@ -128,7 +128,7 @@ def test_many_instances_leave_the_interpreter_as_it_was(dist: Path, tmp_path: Pa
             FmuInstance(tmp_path).fmu.freeInstance()
         gc.collect()
 
-    come_and_go(300)  # what fmpy and ctypes keep comes to rest
+    come_and_go(300)  # caches of fmpy and ctypes are full from now on
     script = (tmp_path / "resources" / "slavemodule.txt").read_text()
     before, path = sys.getrefcount(vars(sys.modules[script])), list(sys.path)
     blocks = sys.getallocatedblocks()
@@ -265,7 +265,7 @@ def test_resources_need_nothing_but_an_old_standard_library(dist: Path, name: st
 
 
 @pytest.mark.parametrize("name", EACH)
-def test_runs_alone_from_the_command_line_of_fmpy(dist: Path, tmp_path: Path, name: str):
+def test_fmpy_runs_each_fmu_from_its_command_line(dist: Path, tmp_path: Path, name: str):
     output = tmp_path / "result.csv"
     subprocess.run(
         [sys.executable, "-m", "fmpy", "simulate", str(dist / f"{name}.fmu"), "--stop-time", "2",

@@ -1,4 +1,4 @@
-"""What hosts read of the native kind, in both versions of FMI, beside the Python kind."""
+"""The descriptions of the native kind, in both versions of FMI, against the Python kind."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ ITS_OWN = {"instantiationToken", "generationTool", "buildConfigurations"}
 
 
 def everything(description: ModelDescription) -> dict[str, Any]:
-    """All that a host reads, without what depends on the layout of the file."""
+    """Everything that a host reads, without the layout of the file."""
     return attrs.asdict(description, filter=lambda field, _: field.name != "sourceline")
 
 
@@ -57,13 +57,13 @@ def python(request, dist: Path) -> ModelDescription:
 
 @pytest.fixture(scope="module")
 def fmi2(python: ModelDescription, tmp_path_factory) -> Path:
-    """A folder with what the native kind says of itself in FMI 2.0."""
+    """A folder with the description of the native kind in FMI 2.0."""
     return written(tmp_path_factory.mktemp("fmi2"), fmi2_description, python.modelName)
 
 
 @pytest.fixture(scope="module")
 def fmi3(python: ModelDescription, tmp_path_factory) -> Path:
-    """A folder with what the native kind says of itself in FMI 3.0."""
+    """A folder with the description of the native kind in FMI 3.0."""
     name = python.modelName
     path = written(tmp_path_factory.mktemp("fmi3"), fmi3_description, name)
     for file, content in (
@@ -114,7 +114,7 @@ def test_sources_of_fmi3_are_one_file(fmi3: Path):
 
 
 def values_of(variable: dict[str, Any]) -> dict[str, Any]:
-    """What both versions of FMI say of a variable, in the words of FMI 2.0."""
+    """The attributes of a variable that both versions of FMI have, by their names in FMI 2.0."""
     variable = {key: variable[key] for key in SAID}
     variable["type"] = TYPES.get(variable["type"], variable["type"])
     variable["declaredType"] = (variable["declaredType"] or {}).get("name")
@@ -137,7 +137,7 @@ def test_both_versions_have_the_same_variables(fmi2: Path, fmi3: Path):
 
 
 def edges(description: ModelDescription, part: str) -> dict[str, set[str]]:
-    """What each unknown depends on, but for the time."""
+    """The dependencies of each unknown, except the time."""
     return {
         unknown.variable.name: {v.name for v in unknown.dependencies} - {"time"}
         for unknown in getattr(description, part)
@@ -151,8 +151,8 @@ def test_both_versions_have_the_same_dependencies(fmi2: Path, fmi3: Path, part: 
     assert one == other
 
 
-def test_only_what_names_the_time_depends_on_it(fmi3: Path):
-    """Of this vehicle, the disturbance."""
+def test_only_outputs_that_declare_the_time_depend_on_it(fmi3: Path):
+    """In this vehicle, only the disturbance."""
     description = read_model_description(str(fmi3))
     found = {
         unknown.variable.name.split(".")[0]
@@ -224,7 +224,7 @@ def test_connecting_terminals_by_name_wires_the_closed_loop():
 def test_starts_and_bounds_are_the_declared_ones_and_can_be_set(
     dist: Path, native: Path, tmp_path: Path, name: str
 ):
-    """Each to the bit, and at its bounds, where a text with fewer digits may lie beyond."""
+    """To the bit, and at the bounds, which a text with fewer digits may exceed."""
     ports = {port.name: port for port in ports_of(name)}
     for kind, fmus in ((PYTHON, dist), (NATIVE, native)):
         library = Library(Path(fmpy.extract(str(fmus / f"{name}.fmu"), tmp_path / kind)))

@@ -1,6 +1,6 @@
-"""What no slave can be told: wrong pointers, dead handles, text that is none, FMUs without a slave.
+"""Calls that no slave can answer: wrong pointers, dead handles, invalid text, FMUs without a slave.
 
-None of it may end the host. Each test is one class of mistakes beside those of fmi-answers.md, on
+No such call may end the host. Each test is one class of mistakes that fmi-answers.md lacks, on
 one small FMU of each kind: the guard is the loader's or the runtime's, and the same for all FMUs.
 """
 
@@ -26,15 +26,7 @@ from fmus.python.component import LONGEST_MESSAGE
 from fmus.python.packaging import build_script, loader_compiler
 from support.fmi3 import Fmi3Library
 from support.kinds import FIXTURES
-from support.raw import (
-    Host,
-    Library,
-    Message,
-    Status,
-    harmless,
-    initialised,
-    instance,
-)
+from support.raw import Host, Library, Message, Status, harmless, initialised, instance
 
 pytestmark = pytest.mark.skipif(loader_compiler() is None, reason="there is no C compiler")
 
@@ -71,7 +63,7 @@ def library(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
 
 @pytest.fixture(scope="module")
 def planner(fmus: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
-    """Of the same kind."""
+    """Another FMU of the same kind."""
     return Library(unpacked(fmus, tmp_path_factory, "MotionPlanner"))
 
 
@@ -106,7 +98,7 @@ def in_error(host: Host) -> None:
 
 
 def refused(library: Library, **arguments: Any) -> Message:
-    """What is said, with logging off, where there is no instance."""
+    """The only message, with logging off, of a call that gives no instance."""
     host = Host(library)
     before = list(sys.path)
     assert not host.instantiate(**arguments, logging=False)
@@ -131,7 +123,7 @@ def test_place_without_a_slave_is_null_with_one_message(python, what, location):
     assert (message.status, message.category) == (ERROR, "logStatusError")
 
 
-def test_guid_is_that_of_the_description_or_not_stated(of_any_version: Library):
+def test_guid_is_in_the_description_or_not_stated(of_any_version: Library):
     stated = of_any_version.description.guid.encode()
     bare = stated.strip(b"{}")
     for guid in (None, b"", stated, bare, stated.upper(), bare.upper(), bare.lower()):
@@ -194,7 +186,7 @@ def test_folder_without_a_slave_is_null_with_one_message(python, resources, file
 
 
 def test_long_reason_is_cut_between_characters(python, resources):
-    """And a percent sign is doubled, as in all formats."""
+    """Percent signs are doubled, as in all formats."""
     (resources / "slavemodule.txt").write_text("guarded_k")
     said = "100 % %d %% " + "ü" * 2000
     (resources / "guarded_k.py").write_text(f"raise ValueError({said!r})", encoding="utf-8")
@@ -207,8 +199,8 @@ def test_long_reason_is_cut_between_characters(python, resources):
     "name", ["slavemodule.txt", "guid.txt", "{script}.py", "__pycache__/{script}.{tag}.pyc"]
 )
 @pytest.mark.parametrize("kind", ["pipe", "device", "folder"])
-def test_resource_that_is_no_file_is_not_waited_for(python, resources, name: str, kind: str):
-    """A pipe would be read from for ever, and so would the device."""
+def test_resources_other_than_files_are_refused_at_once(python, resources, name: str, kind: str):
+    """Reading a pipe or the device would not end."""
     path = resources / name.format(script=script_of(resources), tag=sys.implementation.cache_tag)
     path.parent.mkdir(exist_ok=True)
     path.unlink(missing_ok=True)
@@ -244,7 +236,7 @@ ARRAYS = {"Real": (c_double * 2)(), "Integer": (c_int * 2)(), "Boolean": (c_int 
           "String": STRINGS}  # fmt: skip
 TOO_MANY = c_size_t(2**31)
 
-#: Function, and arguments that cannot be forwarded, beside those of docs/reference/fmi-answers.md.
+#: Function, and arguments that cannot be forwarded; docs/reference/fmi-answers.md has others.
 WRONG = [
     *(
         (f"{verb}{kind}", (ONE, n, values))
@@ -268,7 +260,7 @@ def test_wrong_argument_is_an_error_with_one_message(host: Host, function, argum
     assert (message.status, message.category) == (ERROR, "logStatusError")
 
 
-#: What is refused of an FMU that is initialised, and the answer.
+#: Refused calls on an FMU that is initialised, each with its answer.
 REFUSED = [
     *(
         (Status.Discard, lambda host, name=name, value=value: put(host, name, value))
@@ -291,7 +283,7 @@ REFUSED = [
 def test_refusals_are_told_once_and_only_errors_with_logging_off(
     of_any_version: Library, status, call, logging
 ):
-    """Each in its call, and answered again where it is not told again."""
+    """Each in its call; a repeated one has the same answer and no message."""
     with initialised(of_any_version, logging=logging) as host:
         assert [call(host), call(host)] == [status] * 2
         said = [(message.status, message.category) for message in host.messages]
@@ -331,7 +323,7 @@ def test_sum_of_steps_reaches_the_stop_time_and_no_step_goes_beyond(
 def test_of_several_values_all_are_taken_or_none(
     host: Host, bad: str | None, value: float, answer: Status, place: int
 ):
-    """An input and a tunable parameter beside a value that may be bad, wherever it stands."""
+    """An input, a tunable parameter and a value that may be bad, in any order."""
     good = [reference(host, "y.x"), reference(host, "k_d")]
     before, given = host.get("Real", good), [0.5, 60.0]
     references, values = [*good], [*given]
@@ -343,7 +335,7 @@ def test_of_several_values_all_are_taken_or_none(
     assert len(host.messages) == (answer != OK)
 
 
-# What is not alive
+# Dead handles
 
 
 def test_no_function_touches_what_is_not_alive(library: Library, capfd):
@@ -370,7 +362,7 @@ def test_handle_of_another_fmu_is_told_from_ones_own(host: Host, planner: Librar
 
 
 def test_handle_is_given_once(host: Host):
-    """Whatever is freed in between, and with more alive than a table begins with."""
+    """Also after others were freed, and with more than a table begins with."""
     handles = [host.component]
     for _ in range(100):
         with instance(host.library) as other:
@@ -392,7 +384,7 @@ def test_states_end_with_their_instance(host: Host):
 
 
 def test_state_that_is_given_is_used_again(host: Host):
-    """And holds what it is now."""
+    """It holds the present values."""
     first = c_void_p()
     assert host.call("fmi2GetFMUstate", byref(first)) == OK
     before = first.value
@@ -430,7 +422,7 @@ def test_logger_that_calls_back_is_refused(host: Host, capfd):
 
 
 def test_messages_of_a_call_are_told_in_their_order(host: Host):
-    """Also where the logger calls back, which changes no value of the call."""
+    """Also if the logger calls back, which changes no value of the call."""
     unknown = range(UNKNOWN, UNKNOWN + 5)
     answers = []
     host.when_told = lambda: answers.append(host.step(0.0, 0.02))

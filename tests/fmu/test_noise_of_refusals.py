@@ -1,15 +1,12 @@
-"""A component whose noise may be refused: such a step takes nothing of the noise, in both kinds."""
+"""A step whose noise is refused draws nothing from the generator, in both kinds."""
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import fmpy
 import pytest
 
 from fmus.kinds import KINDS
 from orchestrator.machine.compilers import machines_compiler
-from orchestrator.runs.own_components import build_own
+from support.own import built
 from support.raw import Host, Library, Status, initialised
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -81,8 +78,7 @@ def library(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFac
     folder = tmp_path_factory.mktemp("noisy")
     script = folder / f"noisy_{request.param}.py"
     script.write_text(SCRIPT, encoding="utf-8")
-    fmu = build_own(script, folder / "fmu", kind=request.param)
-    return Library(Path(fmpy.extract(str(fmu), folder / "unpacked")))
+    return Library(built(script, request.param, folder / "fmu"))
 
 
 def put(host: Host, name: str, value: float) -> None:

@@ -1,23 +1,21 @@
-"""What hosts make of a refusal: none ends the run as a success, and a reset leaves nothing."""
+"""Refusals in hosts: none ends the run as a success, and a reset leaves no trace."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from ctypes import byref, c_double
 from dataclasses import replace
 from math import hypot, nan
 from pathlib import Path
 from random import Random
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import fmi2LastSuccessfulTime, fmi2Terminated
-from fmpy.model_description import ModelDescription, read_model_description
-from fmpy.simulation import instantiate_fmu
 
-from fmus.kinds import NATIVE, PYTHON
+from fmus.kinds import KINDS, NATIVE, PYTHON
 from orchestrator import simulate
 from orchestrator.cosim import Experiment
 from orchestrator.exchange import hosts
@@ -25,6 +23,8 @@ from orchestrator.exchange.hosts import HOSTS, real_outputs
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
+from support.fmi3 import Fmi3Library
+from support.raw import LAST_SUCCESSFUL_TIME_KIND, Host, Library, Status, instance
 
 #: Fixtures of the FMUs of each kind and version.
 FMUS = {PYTHON: "dist", NATIVE: "native", "native-3": "dist3"}
@@ -51,7 +51,7 @@ class Refused(NamedTuple):
     why: str = ""
 
 
-#: By what is refused.
+#: Runs by the reason of the refusal.
 REFUSALS = {
     "an exception of the equations": Refused(
         "MotionPlanner", {"tau_d.q": 8.0}, step=0.5, steps=20, why="pitch"
@@ -68,11 +68,6 @@ CASES = [pytest.param(kind, case, id=f"{kind}-{case}") for kind in FMUS for case
 @pytest.fixture
 def fmu(request: pytest.FixtureRequest) -> Callable[[str, str], Path]:
     return lambda kind, name: request.getfixturevalue(FMUS[kind]) / f"{name}.fmu"
-
-
-def described(path: Path) -> tuple[ModelDescription, dict[str, Any]]:
-    description = read_model_description(path)
-    return description, {v.name: v for v in description.modelVariables}
 
 
 def table(refused: Refused) -> np.ndarray | None:
@@ -96,9 +91,9 @@ def test_fmpy_does_not_end_the_run_as_a_success(fmu, kind: str, case: str):
             step_size=refused.step,
             output_interval=refused.step,
             stop_time=refused.steps * refused.step,
-            debug_logging=True,  # what is discarded is no error
+            debug_logging=True,  # else only errors are logged
             logger=lambda *arguments: heard.append(arguments[-1].decode()),
-            # fmpy repeats a discarded step for ever, if the FMU lets it.
+            # fmpy repeats a discarded step without end if the FMU lets it.
             timeout=60.0,
         )
     assert refused.why in heard[-1]
@@ -116,7 +111,7 @@ def test_our_master_fails_with_the_reason(fmu, kind: str, case: str):
             step=refused.step,
         )
     except ValueError as error:
-        said = str(error)  # of what it knows not to be a value
+        said = str(error)  # refused before the run
     else:
         said = result.failure or ""
     assert refused.why in said
@@ -125,106 +120,59 @@ def test_our_master_fails_with_the_reason(fmu, kind: str, case: str):
 # By hand
 
 
-class Driven:
-    """An instance of either version of FMI, as fmpy calls it."""
+def put(host: Host, values: Mapping[str, float]) -> Status:
+    references = [host.description.find(name).reference for name in values]
+    return host.set("Real", references, [*values.values()])
 
-    def __init__(self, path: Path) -> None:
-        description, self.variables = described(path)
-        self._slave = instantiate_fmu(fmpy.extract(str(path)), description)
-        self.is_3 = description.fmiVersion.startswith("3")
-        self.outputs = [
-            v.valueReference
-            for v in description.modelVariables
-            if v.causality == "output" and v.type in ("Real", "Float64")
-        ]
 
-    def __enter__(self) -> Driven:
-        return self
+def started(host: Host, values: Mapping[str, float] = {}) -> Status:
+    host.setup()
+    put(host, values)
+    return max(host.enter(), host.exit())
 
-    def __exit__(self, *_: object) -> None:
-        self._slave.freeInstance()
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._slave, name)
-
-    def start(self, values: Mapping[str, float] = {}) -> None:
-        if not self.is_3:
-            self._slave.setupExperiment(startTime=0.0)
-        self.set(values)
-        self._slave.enterInitializationMode()
-        self._slave.exitInitializationMode()
-
-    def set(self, values: Mapping[str, float]) -> None:
-        references = [self.variables[name].valueReference for name in values]
-        function = self._slave.setFloat64 if self.is_3 else self._slave.setReal
-        function(references, [*values.values()])
-
-    def step(self, k: int, h: float) -> tuple[float, ...]:
-        self._slave.doStep(currentCommunicationPoint=k * h, communicationStepSize=h)
-        get = self._slave.getFloat64 if self.is_3 else self._slave.getReal
-        return tuple(get(self.outputs))
-
-    def make(self, refused: Refused) -> None:
-        self.set(refused.inputs)
-        for k in range(refused.steps):
-            self.step(k, refused.step)
-
-    @property
-    def fault(self) -> bool:
-        reference = [self.variables["fault"].valueReference]
-        return bool(self._slave.getBoolean(reference)[0])
-
-    def run(self, steps: int = 5) -> list[tuple[float, ...]]:
-        return [self.step(k, 0.02) for k in range(steps)]
+def ran(host: Host) -> list[tuple[Status, list[float]]]:
+    return [(host.step(0.02 * k, 0.02), host.outputs()) for k in range(5)]
 
 
 @pytest.mark.parametrize(("kind", "case"), CASES)
-def test_a_refusal_leaves_nothing_after_a_reset(fmu, kind: str, case: str):
+def test_a_refusal_leaves_nothing_after_a_reset(fmu, tmp_path: Path, kind: str, case: str):
     refused = REFUSALS[case]
-    path = fmu(kind, refused.name)
-    with Driven(path) as fresh:
-        fresh.start()
-        expected = fresh.run()
-    with Driven(path) as driven:
-        driven.start(refused.values)
-        with pytest.raises(FMICallException, match=r"status 2"):
-            driven.make(refused)
-        assert driven.fault
-        if not driven.is_3:
-            with pytest.raises(FMICallException):
-                driven.getBooleanStatus(fmi2Terminated)
-            last = driven.getRealStatus(fmi2LastSuccessfulTime)
-            taken = 13 if "tau_d.q" in refused.values else 0
-            assert last == taken * refused.step, "the end of the last step that was taken"
-        driven.reset()
-        assert not driven.fault
-        if not driven.is_3:
-            assert driven.getRealStatus(fmi2LastSuccessfulTime) == 0.0
-        driven.start()
-        assert driven.run() == expected
-        assert not driven.fault
+    folder = Path(fmpy.extract(str(fmu(kind, refused.name)), tmp_path))
+    opened = Fmi3Library(folder) if kind == "native-3" else Library(folder)
+    with instance(opened) as fresh, instance(opened) as host:
+        assert started(fresh) == started(host, refused.values) == Status.OK
+        status, taken = put(host, refused.inputs), 0
+        while status == Status.OK:
+            status = host.step(taken * refused.step, refused.step)
+            taken += status == Status.OK
+        assert (status, taken) == (Status.Discard, 13 if "tau_d.q" in refused.values else 0)
+        assert host.fault()
+        last = c_double()
+        if kind != "native-3":
+            assert host.call("fmi2GetRealStatus", LAST_SUCCESSFUL_TIME_KIND, byref(last)) == 0
+            assert last.value == taken * refused.step, "the end of the last step that was taken"
+        assert host.call("fmi2Reset") == started(host) == Status.OK
+        assert not host.fault()
+        assert ran(host) == ran(fresh)
 
 
-def test_kinds_agree_on_the_largest_state_to_its_last_bit(fmu):
+def test_kinds_agree_on_the_largest_state_to_its_last_bit(fmu, tmp_path: Path):
     random, answers = Random(1), set()
-    with Driven(fmu(PYTHON, "AuvPlant")) as python, Driven(fmu(NATIVE, "AuvPlant")) as native:
+    folders = [fmpy.extract(str(fmu(kind, "AuvPlant")), tmp_path / kind) for kind in KINDS]
+    python, native = (Library(Path(folder)) for folder in folders)
+    with instance(python) as one, instance(native) as other:
         for _ in range(200):
             place = [random.uniform(0.5, 1.0) for _ in range(3)]
             scale = 1e100 / hypot(*place) * (1.0 + random.randint(-2, 2) * 2.0**-53)
             values = {f"eta0.{name}": x * scale for name, x in zip("xyz", place, strict=True)}
-            said = {_starts(one, values) for one in (python, native)}
+            said = set()
+            for host in (one, other):
+                host.call("fmi2Reset")
+                said.add(started(host, values) == Status.OK)
             assert len(said) == 1, values
             answers |= said
     assert answers == {True, False}
-
-
-def _starts(driven: Driven, values: Mapping[str, float]) -> bool:
-    driven.reset()
-    try:
-        driven.start(values)
-    except FMICallException:
-        return False
-    return True
 
 
 # Tools

@@ -12,17 +12,14 @@ from support.all_types import build
 from support.hosts import GCC, MEMORY, THREADS, arguments_of, sanitized, sanitized_host
 from support.settings import REPRESENTATIVES
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(GCC is None, reason="gcc is not installed"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(GCC is None, reason="gcc is not installed")]
 
-#: Calls of a host that makes them at random, and how often it starts anew.
-CALLS, SEEDS = 5_000, range(2)
+#: Calls of a host that makes them at random, and the seeds of its runs.
+CALLS, SEEDS = 20_000, range(2)
 
 
 def said_by(host: Path, *arguments: str) -> str:
-    """What a host has said that has ended well."""
+    """Output of a host that has ended well."""
     options = {"ASAN_OPTIONS": "allocator_may_return_null=1"}
     process = subprocess.run(
         [host, *arguments], env=options, capture_output=True, text=True, check=False

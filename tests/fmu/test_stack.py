@@ -11,19 +11,19 @@ from pathlib import Path
 import fmpy
 import pytest
 
-from fmus.kinds import FMI_VERSIONS
+from fmus.kinds import FMI_VERSIONS, NATIVE
 from fmus.language.build import Untranslatable
 from fmus.native.translator import translated
 from fmus.script import source_of_script
 from orchestrator.machine.compilers import machines_compiler
-from orchestrator.runs.own_components import build_own
+from support.own import built
 from support.tiers import slow
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
 TESTS = Path(__file__).parents[1]
 
-#: All that a host does with an instance, on a thread with that stack.
+#: Every use that a host makes of an instance, on a thread with that stack.
 _DRIVE = """\
 import sys, threading
 from pathlib import Path
@@ -228,7 +228,7 @@ def drive(folder: Path, version: str = "2") -> None:
     assert process.returncode == 0, process.stderr[-2000:]
 
 
-#: What stands for the others in quick tests.
+#: Cases of the quick tests.
 QUICK = ("a state that is not credible",)
 
 
@@ -244,8 +244,7 @@ def test_the_largest_that_is_taken_runs_with_512_kb(tmp_path: Path, what: str):
         least, most = (n, most) if is_taken(tmp_path, what, n) else (least, n)
     for version in FMI_VERSIONS:
         own = script(tmp_path, what, least)
-        fmu = build_own(own, tmp_path / f"fmu{version}", kind="native", fmi=version)
-        drive(Path(fmpy.extract(str(fmu), tmp_path / f"unpacked{version}")), version)
+        drive(built(own, NATIVE, tmp_path / f"fmu{version}", version), version)
 
 
 @pytest.mark.parametrize("name", ["AuvPlant", "FormationPlanner"])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack
+from concurrent.futures import ProcessPoolExecutor
 from functools import cache
+from multiprocessing import get_context
 from pathlib import Path
 
 import fmpy
@@ -12,7 +13,7 @@ import pytest
 
 from fmus.kinds import NATIVE, PYTHON
 from support.calls import CASES, MODEL_EXCHANGE_FUNCTIONS
-from support.cells import has_call
+from support.cells import CREATIONS, FMI3, Key, has_call, mistakes
 from support.kinds import FIXTURES
 from support.settings import NAMES, REPRESENTATIVES
 from support.status_table import (
@@ -24,14 +25,12 @@ from support.status_table import (
     rows,
     without_an_instance,
 )
-from support.trials import CREATIONS, FMI3, Place, trials
-from support.worker import Lost, Worker
 
-#: Longest time for a trial, on a slow machine [s].
-PATIENCE = 60.0
+#: Longest time for a row, on a slow machine [s].
+PATIENCE = 120.0
 
-#: A function, and the case of its arguments.
-Key = tuple[str, str]
+#: FMUs without the native loader.
+PLAIN = "plain"
 
 #: The component that stands for the others of each kind: all share what answers. The second one is
 #: tried where the first has no such port.
@@ -52,7 +51,7 @@ KEYS = {
     ],
 }
 
-#: Functions that PythonFMU's own library has a part in, and no guard of ours.
+#: Functions that PythonFMU's own library answers in part, without a guard.
 UNGUARDED = (
     "fmi2FreeFMUstate",
     "fmi2GetBooleanStatus",
@@ -61,112 +60,57 @@ UNGUARDED = (
     *MODEL_EXCHANGE_FUNCTIONS,
 )
 
-#: With ports of most types.
-PLAIN = "ObserverController"
-
-#: Calls that the loader stops, and what becomes of them without it: one of each kind.
-WITHOUT_THE_LOADER = {
-    ("fmi2SetDebugLogging", "categories NULL, n > 0"): "crash",
-    ("fmi2SetReal", "references NULL, n > 0"): "crash",
-    ("fmi2SetReal", "n = 2^60"): "crash",
-    ("fmi2SetString", "a text that is not UTF-8"): "fmi2Fatal, then crash",
-    ("fmi2SetString", "a text that is NULL"): "fmi2OK",
-    ("fmi2GetReal", "values NULL, n > 0"): "crash",
-    ("fmi2GetFMUstate", "NULL"): "crash",
-    ("fmi2SetFMUstate", "NULL"): "fmi2Fatal, then crash",
-    ("fmi2SetFMUstate", "a pointer to something else"): "crash",
-    ("fmi2FreeFMUstate", "NULL"): "crash",
-    ("fmi2SerializedFMUstateSize", "a pointer to something else"): "crash",
-    ("fmi2SerializeFMUstate", "bytes NULL"): "crash",
-    ("fmi2DeSerializeFMUstate", "bytes NULL, n > 0"): "fmi2OK",
-    ("fmi2DeSerializeFMUstate", "state NULL"): "crash",
-    ("fmi2GetRealStatus", "NULL"): "crash",
-    ("fmi2GetBooleanStatus", "fmi2Terminated"): "fmi2OK",
-    ("fmi2Instantiate", "a name that is NULL"): "crash",
-    ("fmi2Instantiate", "a name that is not UTF-8"): "crash",
-    ("fmi2Instantiate", "the type fmi2ModelExchange"): "an instance",
-    ("fmi2Instantiate", "a GUID of another FMU"): "an instance",
-    ("fmi2Instantiate", "a resource location that is NULL"): "crash",
-    ("fmi2Instantiate", "a resource location that does not exist"): "crash",
-    ("fmi2Instantiate", "a resource location whose slavemodule.txt is garbage"): "crash",
-    ("no instance", "NULL"): "crash",
-}
+#: Tries a row on an FMU of a kind and gives the mistakes.
+Try = Callable[[str, str, Key, Sequence[str]], dict[str, str]]
 
 
-def of_the_slave(key: Key) -> list[str]:
-    """The states in which a row holds without the native loader."""
-    cells = rows()[key].cells if key[0] not in UNGUARDED and has_call(PLAIN, key) else {}
+def states_of(key: Key) -> list[str]:
+    """The states of a row; one without a name for a row without an instance."""
+    return [*rows()[key].cells] if key in rows() else [""]
+
+
+def states_without_loader(key: Key) -> list[str]:
+    """The states in which a row also holds without the native loader."""
+    cells = (
+        rows()[key].cells if key[0] not in UNGUARDED and has_call(REPRESENTATIVES[1], key) else {}
+    )
     is_unsound = key in rows() and rows()[key].is_unsound
     return [s for s, cell in cells.items() if s != ERROR and not (cell.answer.fails and is_unsound)]
 
 
-def unpacked(fmus: Path, folder: Path, *names: str) -> list[Path]:
-    return [Path(fmpy.extract(fmus / f"{name}.fmu", folder / name)) for name in names]
-
-
 @pytest.fixture(scope="module")
-def workers(
+def tried(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Callable[[str, str], Worker[Place, str]]]:
-    """Processes that try cells, one for each kind and component."""
-    with ExitStack() as stack:
+) -> Iterator[Try]:
+    """Rows are tried in a process of their own, which may crash."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as pool:
 
         @cache
-        def worker(kind: str, name: str) -> Worker[Place, str]:
+        def unpacked(kind: str, name: str) -> Path:
+            fmus = request.getfixturevalue({**FIXTURES, FMI3: "dist3", PLAIN: "plain"}[kind])
+            folder = tmp_path_factory.mktemp("status")
+            return Path(fmpy.extract(fmus / f"{name}.fmu", folder))
+
+        def answer(kind: str, name: str, key: Key, states: Sequence[str]) -> dict[str, str]:
             another = NAMES[NAMES.index(name) - 1]
-            fmus = request.getfixturevalue({**FIXTURES, FMI3: "dist3"}[kind])
-            folders = unpacked(fmus, tmp_path_factory.mktemp("status"), name, another)
-            return stack.enter_context(Worker(trials, *folders, kind))
+            folders = unpacked(kind, name), unpacked(kind, another)
+            return pool.submit(mistakes, *folders, kind, key, states).result(PATIENCE)
 
-        yield worker
-
-
-@pytest.fixture(scope="module")
-def plain_worker(
-    plain: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[Worker[Place, str]]:
-    """The same for an FMU without the native loader."""
-    folders = unpacked(plain, tmp_path_factory.mktemp("plain"), PLAIN, "AuvPlant")
-    with Worker(trials, *folders) as process:
-        yield process
-
-
-def mistakes(worker: Worker[Place, str], key: Key, states: Sequence[str]) -> dict[str, str]:
-    """The cells of a row that are not as the table says."""
-    said = {state: worker.ask((key, state), PATIENCE) for state in states}
-    return {
-        state: f"the process is lost: {text.why}" if isinstance(text, Lost) else text
-        for state, text in said.items()
-        if text
-    }
+        yield answer
 
 
 @pytest.mark.parametrize(
     ("kind", "key"), [pytest.param(k, key, id=f"{k}-{key}") for k in KEYS for key in KEYS[k]]
 )
-def test_row(workers: Callable[[str, str], Worker[Place, str]], kind: str, key: Key):
+def test_row(tried: Try, kind: str, key: Key):
     names = (*COMPONENTS[kind], *NAMES)
     name = next(name for name in names if key not in rows() or has_call(name, key))
-    states = [*rows()[key].cells] if key in rows() else [""]
-    assert mistakes(workers(kind, name), key, states) == {}
+    assert tried(kind, name, key, states_of(key)) == {}
 
 
-@pytest.mark.parametrize("key", [key for key in rows() if of_the_slave(key)])
-def test_row_of_a_plain_fmu(plain_worker: Worker[Place, str], key: Key):
-    assert mistakes(plain_worker, key, of_the_slave(key)) == {}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("key", WITHOUT_THE_LOADER, ids=": ".join)
-def test_what_becomes_of_calls_on_a_plain_fmu(plain_worker: Worker[Place, str], key: Key):
-    wrong = plain_worker.ask((key, "stepping"), PATIENCE)
-    expected = WITHOUT_THE_LOADER[key]
-    if isinstance(wrong, Lost):
-        assert wrong.why.startswith("SIG"), wrong
-        assert "crash" in expected
-    else:
-        # What is freed twice does not crash each time.
-        assert wrong.endswith(expected.removeprefix("fmi2").removesuffix(", then crash"))
+@pytest.mark.parametrize("key", [key for key in rows() if states_without_loader(key)])
+def test_row_of_a_plain_fmu(tried: Try, key: Key):
+    assert tried(PLAIN, REPRESENTATIVES[1], key, states_without_loader(key)) == {}
 
 
 def test_every_row_is_tried():

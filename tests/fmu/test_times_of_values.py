@@ -1,4 +1,4 @@
-"""Values belong to their time: what a get shows after inputs and after steps, in both kinds."""
+"""Values belong to their time: get calls after inputs and after steps, in both kinds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from auv_fmu.water.ocean_current import begin
 from auv_fmu.water.sea import Sea, regular_waves, water
 from fmus.kinds import KINDS
 from orchestrator.machine.compilers import machines_compiler
-from orchestrator.runs.own_components import build_own
+from support.own import built
 from support.raw import Host, Library, Status, initialised, instance
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -67,11 +67,10 @@ def outputs(state: State, inputs: Inputs, t: float) -> Outputs:
 U, Y, AT = 0, 1, 2
 
 
-def built(folder: Path, kind: str, name: str, text: str) -> Library:
+def library(folder: Path, kind: str, name: str, text: str) -> Library:
     script = folder / f"{name}_{kind}.py"
     script.write_text(text, encoding="utf-8")
-    fmu = build_own(script, folder / name, kind=kind)
-    return Library(Path(fmpy.extract(str(fmu), folder / f"{name}_unpacked")))
+    return Library(built(script, kind, folder / name))
 
 
 @pytest.fixture(scope="module", params=KINDS)
@@ -81,12 +80,12 @@ def kind(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="module")
 def continuous(kind: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return built(tmp_path_factory.mktemp(kind), kind, "followed", SCRIPT)
+    return library(tmp_path_factory.mktemp(kind), kind, "followed", SCRIPT)
 
 
 @pytest.fixture(scope="module")
 def sampled(kind: str, tmp_path_factory: pytest.TempPathFactory) -> Library:
-    return built(tmp_path_factory.mktemp(kind), kind, "held", f"{SCRIPT}\n\nSAMPLED = True\n")
+    return library(tmp_path_factory.mktemp(kind), kind, "held", f"{SCRIPT}\n\nSAMPLED = True\n")
 
 
 def put(host: Host, u: float) -> None:
@@ -108,7 +107,7 @@ def test_outputs_follow_inputs_at_once(continuous: Library):
         assert seen(host) == (Status.OK, [3.5, 0.5])
 
 
-def test_sampled_outputs_are_those_of_the_last_step_until_inputs_come(sampled: Library):
+def test_sampled_outputs_are_held_until_inputs_come(sampled: Library):
     with initialised(sampled) as host:
         put(host, 3.0)
         assert host.step(0.0, 0.5) == Status.OK
@@ -146,7 +145,7 @@ def test_sample_that_is_refused_is_a_refused_step_and_changes_nothing(sampled: L
 
 @pytest.mark.parametrize("serialised", [False, True])
 def test_restored_instance_holds_its_sample(sampled: Library, serialised: bool):
-    """And takes another one in the next step."""
+    """It takes another one in the next step."""
     with initialised(sampled) as host, initialised(sampled) as other:
         assert host.step(0.0, 0.5) == Status.OK
         state = host.get_state()
@@ -161,8 +160,8 @@ def test_restored_instance_holds_its_sample(sampled: Library, serialised: bool):
         assert seen(host) == (Status.OK, [4.0, 0.5])
 
 
-def test_time_is_that_of_a_host_that_counts_its_steps(continuous: Library):
-    """And after a jump, that of one that adds them up."""
+def test_time_is_the_time_of_a_host_that_counts_its_steps(continuous: Library):
+    """After a jump, the time is the sum of the steps."""
     start, h = 0.3, 0.1
     with instance(continuous) as host:
         assert host.setup(start) == host.enter() == host.exit() == Status.OK
@@ -176,7 +175,7 @@ def test_time_is_that_of_a_host_that_counts_its_steps(continuous: Library):
 
 @pytest.mark.parametrize("bundle", ["dist", "native", "dist3"])
 def test_a_long_step_of_the_sea_ends_with_the_elevation_of_its_end(request, bundle: str):
-    """A tool that steps the FMU alone, once a second, shows at t what holds at t."""
+    """A tool that steps only this FMU, once a second, shows at t the value at t."""
     fmu = request.getfixturevalue(bundle) / "Sea.fmu"
     table = fmpy.simulate_fmu(
         str(fmu), stop_time=20.0, step_size=1.0, output_interval=1.0, output=["elevation"]

@@ -1,16 +1,13 @@
-"""Random components: what `check` passes can be built, and both kinds do the same.
-
-    PYTHONPATH=tests python -m fuzz.components --runs 100
+"""Random components: if `check` passes one, it can be built, and both kinds do the same.
 
 Each is a script made from a seed, with ports, state and noise of any types and any of the hooks.
-Every other one has a type exchanged, or another mistake. What is wrong is told with its line. What
-passes has valid descriptions, and both kinds take the same steps: parameters change during the run,
-and from a state that is restored they go on as they did before.
+Every other one has a type exchanged, or another mistake, which is reported with its line. A script
+that passes has valid descriptions, and both kinds take the same steps: parameters change during
+the run, and from a restored state they continue as before it.
 """
 
 from __future__ import annotations
 
-import argparse
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,14 +16,11 @@ from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import fmpy
 from fmpy.validation import validate_fmu
 
 from fmus import check
-from fmus.native.packaging import NativeKind
-from fmus.python.packaging import PythonKind, best_loader
-from fmus.script import source_of_script
-from orchestrator.machine.compilers import compiler_for, platforms
+from fmus.kinds import KINDS
+from support.own import built
 from support.raw import Host, Library, Variable, instance
 
 FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR, EMPTY = (
@@ -34,7 +28,7 @@ FLOAT, INT, BOOL, MODE, V3, M22, II, FF, BB, PAIR, EMPTY = (
     "tuple[int, int]", "tuple[float, float]", "tuple[bool, bool]", "Pair", "Empty",
 )  # fmt: skip
 
-#: How a value of each type is made of values of the types of its parts, and how these are read.
+#: Template of a value of each type, and the accessors of its parts with their types.
 PARTS: Mapping[str, tuple[str, Sequence[tuple[str, str]]]] = {
     V3: ("Vector(({}, {}, {}))", [(f"[{i}]", FLOAT) for i in range(3)]),
     M22: (
@@ -49,30 +43,23 @@ PARTS: Mapping[str, tuple[str, Sequence[tuple[str, str]]]] = {
 }
 TYPES = (FLOAT, INT, BOOL, MODE, *PARTS)
 
-#: What a number is made of others by.
+#: Expressions of each type.
 RULES: Mapping[str, Sequence[str]] = {
     FLOAT: (
-        "0.5 * {f} - 0.25 * {f}",
-        "({f} if {b} else 0.5 * {f})",
-        "{f} / (2.0 + abs({f}))",
-        "1e305 * {f} * {f}",
-        "white_noise({f})",
-        "TABLE[{i} % 3]",
+        "0.5 * {f} - 0.25 * {f}", "({f} if {b} else 0.5 * {f})", "{f} / (2.0 + abs({f}))",
+        "1e305 * {f} * {f}", "white_noise({f})", "TABLE[{i} % 3]",
     ),
     INT: (
-        "({i} % 1000 + 3 * ({i} % 1000)) % 997",
-        "int({f} % 50.0)",
-        "max({i} % 7, -2)",
-        "min({i} % 5, int({b}))",
-        "({m} + {i} % 9) % 100",
+        "({i} % 1000 + 3 * ({i} % 1000)) % 997", "int({f} % 50.0)", "max({i} % 7, -2)",
+        "min({i} % 5, int({b}))", "({m} + {i} % 9) % 100",
     ),
     BOOL: ("{f} < {f}", "not {b}", "{i} % 3 == {i} % 2", "{m} == Mode.LOW"),
     MODE: ("(Mode.HIGH if {b} else {m})", "Mode.LOW"),
-}
+}  # fmt: skip
 LETTERS = {"f": FLOAT, "i": INT, "b": BOOL, "m": MODE}
 CONSTANTS = {FLOAT: ("-0.0", "1.25"), INT: ("0", "-3"), BOOL: ("True",), MODE: ("Mode.OFF",)}
 
-#: Types of what `measured` draws, and how their numbers are read.
+#: Types of the draws of `measured`, and the accessors of their numbers.
 DRAWS = {
     FLOAT: ("n",),
     FF: ("n[0]", "n[1]"),
@@ -87,41 +74,31 @@ _TYPE = re.compile(
     r"(?=[,\]):]| =)"
 )
 
-#: Where a mistake is, or where something was raised.
+#: File and line of a mistake or an exception.
 _PLACE = re.compile(r"\S+\.py:\d+: ")
 
-#: What stands in descriptions.
+#: Descriptions.
 ABOUT = ("", "Plain", 'ü \\" \\\\ <&> 100 % {t:g} ??/ */', "'")
 
-#: What may be logged at a restart.
+#: Messages of a restart.
 MESSAGES = ("again at {t:g} s", "100 % at {t}", "{{t}} is {t:.3f} %d", "ü without a time")
 
 #: Names of fields that C or the runtime has, too.
 NAMES = ("double", "error", "state", "llabs", "math_errhandling", "x_u0302", "self", "made")
 
-#: Modules of ours and functions in them that are outside the language: the user's own are not.
+#: Modules of the bundle with functions outside the language; a user's own may have these names.
 HELPERS = (("plant", "white_noise"), ("euler", "internal_steps"), ("closed_loop", "closed_loop"))
 
-#: What is refused, or means the same in both kinds.
+#: Changes that are refused, or mean the same in both kinds.
 MISTAKES = (
-    ("HIGH = 7", "HIGH = 2147483648"),
-    ("HIGH = 7", "HIGH = 4294967303"),
-    ("HIGH = 7", "HIGH = -5000000000"),
-    ("] = 4\n", "] = True\n"),
-    ("] = 4\n", "] = Mode.HIGH\n"),
-    ("] = 0.25\n", "] = 1\n"),
-    ('"double")', '"x")'),
-    ('"double")', "'a\"b')"),
-    ('"double")', '"back\\\\slash")'),
-    ('"double")', '"two\\nlines")'),
-    ('description="', 'description="\\x0b'),
-    ('description="', 'description="two\\nlines'),
-    ("Mode.LOW", "(Mode.LOW + 1) % 3"),
-    ("Mode.OFF", "0"),
-    ("] = 0\n", "] = False\n"),
-    ("SAMPLED = True", "SAMPLED = 1"),
-    ("{t:g}", "{t!r}"),
-)
+    ("HIGH = 7", "HIGH = 2147483648"), ("HIGH = 7", "HIGH = 4294967303"),
+    ("HIGH = 7", "HIGH = -5000000000"), ("] = 4\n", "] = True\n"), ("] = 4\n", "] = Mode.HIGH\n"),
+    ("] = 0.25\n", "] = 1\n"), ('"double")', '"x")'), ('"double")', "'a\"b')"),
+    ('"double")', '"back\\\\slash")'), ('"double")', '"two\\nlines")'),
+    ('description="', 'description="\\x0b'), ('description="', 'description="two\\nlines'),
+    ("Mode.LOW", "(Mode.LOW + 1) % 3"), ("Mode.OFF", "0"), ("] = 0\n", "] = False\n"),
+    ("SAMPLED = True", "SAMPLED = 1"), ("{t:g}", "{t!r}"),
+)  # fmt: skip
 
 HEAD = '''\
 """A random component."""
@@ -176,7 +153,7 @@ if __name__ == "__main__":
     print(*(line for line in _shown()))
 '''
 
-#: What lies beside it.
+#: A module in the same folder.
 HELPER = """\
 def white_noise(x: float, limit: float = 2.0) -> float:
     assert x < 59.0, f"{x:g} is too large"
@@ -186,7 +163,7 @@ def white_noise(x: float, limit: float = 2.0) -> float:
         x = x * 0.5
 """
 
-#: What a hook returns, and the types of what it may take.
+#: Results of hooks, and types of their arguments.
 RETURNS = {"start": "State", "update": "State", "derive": "Derived", "outputs": "Outputs"}
 TAKEN = {
     "parameters": "Parameters", "inputs": "Inputs", "state": "State", "derived": "Derived",
@@ -198,7 +175,7 @@ Names = dict[str, str]
 
 
 class Component:
-    """One component on its way, from a seed."""
+    """A random component, from a seed."""
 
     def __init__(self, seed: int, rules: Mapping[str, Sequence[str]] = RULES) -> None:
         self._random, self._rules = Random(seed), rules
@@ -316,7 +293,7 @@ class Component:
 
 
 def names_of(owner: str, fields: Names) -> Names:
-    """The numbers in the fields of something, as they are written."""
+    """Expressions and types of all numbers in some fields."""
     found = {}
     for field, hint in fields.items():
         name = f"{owner}.{field}" if owner else field
@@ -325,14 +302,14 @@ def names_of(owner: str, fields: Names) -> Names:
 
 
 def function(head: str, lines: Sequence[str]) -> str:
-    """A function of the lines of its body."""
+    """Text of a function."""
     return (
         "\n".join([f"def {head}", '    """A hook."""', *(f"    {line}" for line in lines)]) + "\n"
     )
 
 
 def text_of(seed: int) -> str:
-    """The component of a seed; of an odd one with a type exchanged, or another mistake."""
+    """Script of a seed's component; an odd seed gives one with a mistake."""
     draw = Random(seed)
     module, function = draw.choice(HELPERS)
     text = Component(seed).text().replace("HELPER", module).replace("white_noise", function)
@@ -349,7 +326,7 @@ def text_of(seed: int) -> str:
 
 
 def files_of(seed: int) -> Mapping[str, str]:
-    """The texts of all files of the component of a seed."""
+    """Texts of all files of a seed's component."""
     module, function = Random(seed).choice(HELPERS)
     return {
         f"random_{seed}.py": text_of(seed),
@@ -361,8 +338,8 @@ def files_of(seed: int) -> Mapping[str, str]:
 # Trials
 
 
-def finding(seed: int) -> str:
-    """What is wrong with the component of a seed; empty: nothing."""
+def findings(seed: int) -> list[str]:
+    """List the problems of the component of a seed."""
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
         files = files_of(seed)
@@ -370,7 +347,7 @@ def finding(seed: int) -> str:
             (folder / name).write_text(text, encoding="utf-8")
         (folder / "checked").mkdir()
         try:
-            return _finding(folder / f"random_{seed}.py", folder, seed)
+            return [*filter(None, [_finding(folder / f"random_{seed}.py", folder, seed)])]
         finally:
             sys.path.remove(str(folder.resolve()))
             for name in files:
@@ -389,15 +366,8 @@ def _finding(script: Path, folder: Path, seed: int) -> str:
 
 
 def difference(script: Path, folder: Path, plan: Sequence[int]) -> str:
-    """Where the two kinds of a component differ, with a random step for each number of a plan."""
-    here, traces = platforms("2", None), []
-    for kind in (
-        PythonKind(best_loader()),
-        NativeKind("2", here, compiler_for(here), lambda line: None),
-    ):
-        fmu = folder / f"{kind.name}.fmu"
-        kind.write(source_of_script(script), fmu)
-        traces.append(_trace(Library(Path(fmpy.extract(fmu, folder / kind.name))), plan))
+    """The first difference of the two kinds, with a random step for each number of a plan."""
+    traces = [_trace(Library(built(script, kind, folder / kind)), plan) for kind in KINDS]
     for place, (one, other) in enumerate(zip(*traces, strict=True)):
         if repr(one) != repr(other):
             return f"at {place}: Python {one}, C {other}"
@@ -454,26 +424,3 @@ def _value(variable: Variable, draw: Random) -> Any:
         "Boolean": draw.randint(0, 1),
         "String": draw.choice((b"low", b"high", b"middle")),
     }[variable.type]
-
-
-def main() -> int:
-    """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m fuzz.components", description=__doc__)
-    parser.add_argument("--runs", type=int, default=100, help="components (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the first component")
-    parser.add_argument("--show", action="store_true", help="print the component of the first seed")
-    options = parser.parse_args()
-    if options.show:
-        print(text_of(options.seed))
-        return 0
-    wrong = 0
-    for seed in range(options.seed, options.seed + options.runs):
-        if said := finding(seed):
-            wrong += 1
-            print(f"seed {seed}: {said:.500}", flush=True)
-    print(f"{options.runs} components, {wrong} with a finding")
-    return 1 if wrong else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

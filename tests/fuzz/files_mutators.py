@@ -24,7 +24,7 @@ NASTY = (
 
 
 def some_bytes(content: bytes, random: Random) -> bytes:
-    """Some bytes changed, left out, doubled, or the rest cut off."""
+    """Change, drop or double some bytes, or cut off the rest."""
     content = bytearray(content)
     for _ in range(random.choice((1, 1, 2, 8))):
         at = random.randrange(len(content) + 1)
@@ -44,7 +44,7 @@ def some_bytes(content: bytes, random: Random) -> bytes:
 
 
 def table(content: bytes, random: Random) -> bytes:
-    """A table of which cells, rows, columns or separators are not what they were."""
+    """Change cells, rows, columns or separators of a table."""
     rows = [line.split(",") for line in content.decode().splitlines()]
     separator, end, mark = ",", "\n", ""
     for _ in range(random.choice((1, 1, 1, 2, 4))):
@@ -93,7 +93,7 @@ def _put(rows: list[list[str]], row: int, column: int, text: str) -> None:
 
 
 def _written_otherwise(text: str, random: Random) -> str:
-    """The same number, or nearly, as another program may write it."""
+    """Write the same number, or nearly, as another program may write it."""
     try:
         number = float(text)
     except ValueError:
@@ -113,14 +113,14 @@ def _renamed(name: str, rows: list[list[str]], random: Random) -> str:
 
 
 def _wrong_column(rows: list[list[str]], column: int, random: Random) -> None:
-    """Every value of a column, and one of them none: such columns were dropped once."""
+    """Change every value of a column, one of them to invalid text."""
     for row in rows[1:]:
         _put([row], 0, column, "999")
     _put(rows, random.randrange(1, len(rows)), column, random.choice(NASTY))
 
 
 def xml(content: bytes, random: Random) -> bytes:
-    """A tree of which elements or attributes are not what they were."""
+    """Change elements or attributes of a tree."""
     if random.random() < 0.25:
         return _xml_text(content, random)
     root = ElementTree.fromstring(content)
@@ -147,7 +147,7 @@ def xml(content: bytes, random: Random) -> bytes:
 
 
 def _legal(text: str) -> str:
-    """What may stand in XML."""
+    """Drop the characters that XML does not allow."""
     return "".join(letter for letter in text if letter >= " " or letter in "\t\n\r")
 
 
@@ -173,7 +173,7 @@ def _xml_text(content: bytes, random: Random) -> bytes:
 
 
 def toml(content: bytes, random: Random) -> bytes:
-    """A scenario of which lines or values are not what they were."""
+    """Change lines or values of a scenario."""
     lines = content.decode().splitlines()
     values = (
         *("[" * n + "]" * n for n in (1, 3, 5000)), "{}", '{ a = 1 }', "9" * 400, "9" * 5000,
@@ -207,7 +207,7 @@ def toml(content: bytes, random: Random) -> bytes:
 
 
 def json(content: bytes, random: Random) -> bytes:
-    """A record of which values are not what they were."""
+    """Change values of a record."""
     if random.random() < 0.3:
         return some_bytes(content, random)
     text = content.decode()
@@ -224,7 +224,7 @@ def json(content: bytes, random: Random) -> bytes:
 
 
 def archive(content: bytes, random: Random) -> bytes:
-    """A zip archive with something wrong in its structure."""
+    """Break the structure of a zip archive."""
     try:
         with zipfile.ZipFile(io.BytesIO(content)) as whole:
             entries = {name: whole.read(name) for name in whole.namelist()}

@@ -1,7 +1,5 @@
 """Random systems of random components: their programs do what their FMUs do, bit for bit.
 
-    PYTHONPATH=tests python -m fuzz.systems --runs 10
-
 A pool is some components, made from a seed and built once as FMUs of both kinds, and systems that
 are wired from them: at random, without rings of direct feedthroughs, with values that change on
 their way, steps of components, any order, and any start. Each runs with the FMUs of both kinds, and
@@ -11,13 +9,8 @@ in. Some components refuse: then so does the program, after as many steps.
 
 from __future__ import annotations
 
-import argparse
-import json
 import re
-import subprocess
 import sys
-from base64 import b64decode
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -27,31 +20,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fmus.kinds import NATIVE, PYTHON
-from fmus.native.packaging import NativeKind
+from fmus.kinds import KINDS, NATIVE, PYTHON
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX
-from fmus.python.packaging import PythonKind, best_loader
 from fmus.script import source_of_script
-from fuzz.components import (
-    BOOL,
-    EMPTY,
-    FLOAT,
-    HEAD,
-    HELPER,
-    INT,
-    MESSAGES,
-    MODE,
-    PAIR,
-    RETURNS,
-    RULES,
-    TAKEN,
-    TYPES,
-    Component,
-    Names,
-    function,
-    names_of,
-)
+from fuzz.components import BOOL, FLOAT, HELPER, INT, MODE, RULES, Component
 from orchestrator.cosim import Component as Fmu
 from orchestrator.cosim import (
     Connection,
@@ -67,223 +40,49 @@ from orchestrator.cosim import (
     simulate_plan,
 )
 from orchestrator.cosim.connection import can_feed
-from orchestrator.live import module
-from orchestrator.live.module import MODULE, OF_PROGRAM, Source
-from orchestrator.machine.compilers import compiler_for, platforms
 from orchestrator.machine.errors import InputError
 from orchestrator.program.writer import Equations, Text
-from support.programs import compiled, play, values_of
+from support.own import built
+from support.programs import compiled, play
 
 #: Components of a pool, and systems that are made of them.
-COMPONENTS, SYSTEMS = 6, 20
+COMPONENTS, SYSTEMS = 4, 12
 
-#: Where the Python kind says that something was raised.
+#: File and line of an exception in the Python kind.
 _PLACE = re.compile(r"\S+\.py:\d+: ")
-
-#: Sine and its like, the same for every compiler.
-SAME_FUNCTIONS = Path(__file__).parents[1] / "support" / "same_functions.h"
 
 #: Numbers that stay small, mostly: a run should come to its end.
 CALM: Mapping[str, Sequence[str]] = {
     FLOAT: (
-        "0.5 * {f} - 0.25 * {f}",
-        "({f} if {b} else 0.5 * {f})",
-        "{f} / (2.0 + abs({f}))",
-        "{f} * {f} / (1.0 + abs({f}))",
-        "min({f}, max({f}, -3.0))",
-        "sqrt(abs({f}))",
-        "sin({f})",
-        "0.001 * {i}",
-        "TABLE[{i} % 3]",
+        "0.5 * {f} - 0.25 * {f}", "({f} if {b} else 0.5 * {f})", "{f} / (2.0 + abs({f}))",
+        "{f} * {f} / (1.0 + abs({f}))", "min({f}, max({f}, -3.0))", "sqrt(abs({f}))", "sin({f})",
+        "0.001 * {i}", "TABLE[{i} % 3]",
     ),
     INT: RULES[INT],
     BOOL: RULES[BOOL],
     MODE: RULES[MODE],
-}
+}  # fmt: skip
 
-#: Names of components in systems, some of which C or a program has as well.
+#: Names of components in systems, some of which are also names of C or of a program.
 NAMES = ("one", "two", "auv.plant", "auv_plant", "double", "it", "steps", "made", "3d", "ü.p")
 
-#: How long components take, in steps.
+#: Lengths of components' steps, in steps of the run.
 EVERY = (1, 1, 1, 2, 3, 4)
 
 
-#: Types of the arguments of hooks, and what hooks return.
-ARGUMENTS = {**TAKEN, "h": FLOAT}
-
-
-class Calm(Component):
-    """A component whose numbers stay small, and whose outputs depend on what they say."""
-
-    def __init__(self, seed: int) -> None:
-        # What loops until a number is small makes no quick program.
-        loops = (*CALM[FLOAT], "white_noise({f})")
-        super().__init__(seed, {**CALM, FLOAT: loops} if seed % 10 == 9 else CALM)
-        draw = self._random
-        self._groups: dict[str, Names] = {
-            name: {
-                f"{name[0].lower()}{i}": draw.choice((FLOAT, FLOAT, *TYPES))
-                for i in range(draw.randint(1, 4))
-            }
-            for name in ("Parameters", "Inputs", "State", "Outputs", "Derived")
-        }
-        self._groups["Parameters"] |= {"gain": FLOAT, "limit": FLOAT}
-        self._groups["Inputs"]["u"] = self._groups["State"]["x"] = FLOAT
-        self._groups["Outputs"]["y"] = FLOAT
-        for name, share in (("State", 0.8), ("Derived", 0.5)):
-            if draw.random() > share:
-                del self._groups[name]
-        known = {name.lower(): names_of(name.lower(), of) for name, of in self._groups.items()}
-        self._known = {"state": {}, "derived": {}, **known}
-        self._is_sampled = draw.random() < 0.3
-        # Inputs that outputs depend on by the guard of the state, and by what is derived.
-        self._of_guard = self._some(*self._groups["Inputs"]) if draw.random() < 0.5 else []
-        self._is_guarded = "State" in self._groups and draw.random() < 0.5
-        self._of_derived = self._some(*self._groups["Inputs"]) if draw.random() < 0.5 else []
-        self._has_time = [draw.random() < 0.4 for _ in range(2)]
-        self._derives_state = draw.random() < 0.6
-
-    def text(self) -> str:
-        """The script."""
-        draw, known, hooks = self._random, self._known, dict[str, list[str]]()
-        inputs, state = known["inputs"], known["state"]
-        time, late = ({"t": FLOAT} if there else {} for there in self._has_time)
-        if "Derived" in self._groups:
-            names = known["parameters"] | self._inputs(self._of_derived) | late
-            names |= state if self._derives_state else {}
-            hooks["derive"] = [self._returned("Derived", names)]
-        if state:
-            names = known["parameters"] | inputs | time
-            hooks["start"] = [self._returned("State", names)]
-            names |= state | known["derived"] | {"h": FLOAT}
-            hooks["update"] = [
-                self._returned("State", names).replace("return", "made ="),
-                f"return made._replace(x=0.5 * state.x + h * {self._number(FLOAT, names, 2)})",
-            ]
-        hooks["outputs"], notes = self._outputs(time)
-        for hook in hooks:
-            if draw.random() < 0.3:
-                hooks[hook] = [*self._limit(hook), *hooks[hook]]
-        if state and draw.random() < 0.15:
-            # What is not finite, and what cannot be computed.
-            wrong = draw.choice(("1e308 * abs(state.x) * 10.0", "state.x / (state.x - state.x)"))
-            hooks["update"][-1:-1] = [
-                "if abs(state.x) > parameters.limit:",
-                f"    return made._replace(x={wrong})",
-            ]
-        if self._is_sampled and "inputs." not in " ".join(hooks["outputs"]):
-            hooks["outputs"].insert(0, "_ = inputs.u")
-        return self._script(hooks, notes)
-
-    def _returned(self, name: str, names: Names) -> str:
-        return f"return {self._made(name, self._groups[name], names)}"
-
-    def _inputs(self, fields: Sequence[str]) -> Names:
-        """The numbers in some of the inputs."""
-        found = self._known["inputs"].items()
-        return {name: kind for name, kind in found if re.split(r"[.\[]", name)[1] in fields}
-
-    def _outputs(self, time: Names) -> tuple[list[str], Mapping[str, Sequence[str]]]:
-        """The body of `outputs`, and the inputs that each field depends on."""
-        fields, values, notes = self._groups["Inputs"], [], {}
-        guard = {*self._of_guard} if self._is_guarded else set()
-        derived = {*self._of_derived} | (guard if self._derives_state else set())
-        for field, hint in self._groups["Outputs"].items():
-            # A record says nothing, and so depends on all.
-            if hint in (PAIR, EMPTY) or self._random.random() < 0.2:
-                direct = [*fields]
-            else:
-                direct = self._some(*fields) if self._random.random() < 0.6 else []
-            if self._is_sampled and all(fields[one] == EMPTY for one in direct):
-                direct = ["u"]
-            names = self._known["parameters"] | self._inputs(direct) | time
-            names |= self._known["state"] if guard <= {*direct} else {}
-            names |= self._known["derived"] if derived <= {*direct} else {}
-            values.append(self._value(hint, names))
-            notes[field] = direct
-        return [f"return Outputs({', '.join(values)})"], notes
-
-    def _limit(self, hook: str) -> list[str]:
-        """What lets a hook refuse."""
-        of_input = {"start": True, "outputs": False, "derive": "u" in self._of_derived}
-        names = {"inputs.u": FLOAT} if of_input.get(hook, True) else {}
-        if hook != "start" and (hook != "derive" or self._derives_state):
-            names |= {name: FLOAT for name in self._known["state"] if name == "state.x"}
-        names = names or {"parameters.gain": FLOAT}
-        value = self._random.choice([*names])
-        return [f"if abs({value}) > parameters.limit:", "    raise Refusal('beyond the limit')"]
-
-    def _script(self, hooks: Mapping[str, list[str]], notes: Mapping[str, Sequence[str]]) -> str:
-        draw, text = self._random, {name: " ".join(lines) for name, lines in hooks.items()}
-        arguments = {
-            hook: [one for one in ARGUMENTS if re.search(rf"\b{one}\b(?! =)", said)]
-            for hook, said in text.items()
-        }
-        if draw.random() < 0.5:
-            noise = [*self._noise(self._groups["Outputs"], self._known["parameters"])]
-        else:
-            noise = []
-        guard = [*self._guard()] if self._is_guarded else []
-        taken = {one for found in arguments.values() for one in found} | {"parameters"}
-        taken |= {*re.findall(r"inputs(?=:)", " ".join(guard))}
-        direct = {*arguments["outputs"]}
-        if "derived" in direct:
-            direct |= {*arguments["derive"]}
-        if "state" in direct and "inputs: Inputs" in " ".join(guard):
-            direct.add("inputs")
-        if "inputs" not in direct:
-            notes = {}
-        parts = [HEAD.replace("from pathlib", "from math import sin, sqrt\nfrom pathlib", 1)]
-        for name, fields in self._groups.items():
-            if name in RETURNS.values() or name.lower() in taken:
-                parts.append(self._class_of(name, fields, notes if name == "Outputs" else {}))
-        parts += ["SAMPLED = True\n"] * self._is_sampled
-        parts += ["H_MAX = 0.03\n"] * ("update" in hooks and draw.random() < 0.4)
-        for hook, lines in hooks.items():
-            said = ", ".join(f"{one}: {ARGUMENTS[one]}" for one in arguments[hook])
-            parts.append(function(f"{hook}({said}) -> {RETURNS[hook]}:", lines))
-        lines = ["if parameters.gain > 50.0:", "    raise Refusal('gain is large')"]
-        check = function("check(parameters: Parameters) -> None:", lines)
-        return "\n\n".join([*parts, *guard, *noise, check])
-
-    def _class_of(self, name: str, fields: Names, notes: Mapping[str, Sequence[str]]) -> str:
-        text = self._class(name, fields)
-        if name == "Parameters":
-            text = re.sub(r"(limit: .*) = \S+$", r"\1 = 50.0", text, flags=re.MULTILINE)
-            text = re.sub(r"(gain: .*) = \S+$", r"\1 = 1.5", text, flags=re.MULTILINE)
-        for field, direct in notes.items():
-            said = f"feedthrough={(*direct, *(['time'] if any(self._has_time) else []))!r}"
-            text = re.sub(
-                rf"(    {field}: .*Variable\()(.*)\)\]$",
-                rf"\1\2, {said})]",
-                text,
-                flags=re.MULTILINE,
-            )
-        return text
-
-    def _guard(self) -> Iterator[str]:
-        names = self._known["state"] | self._inputs(self._of_guard)
-        said = "state: State" + ", inputs: Inputs" * bool(self._of_guard)
-        yield f'RESTARTED = "{self._random.choice(MESSAGES)}"\n'
-        yield function(f"credible({said}) -> bool:", [f"return {self._number(BOOL, names)}"])
-        yield function(f"restarted({said}) -> State:", [self._returned("State", names)])
-
-
 def files_of(seed: int) -> Mapping[str, str]:
-    """The texts of all files of the component of a seed."""
-    text = Calm(seed).text().replace("HELPER", "helping_calm")
-    return {
-        f"calm_{seed}.py": text,
-        "helping_calm.py": HELPER,
-        "table.txt": "0.25 -0.0 1.5\n",
-    }
+    """Texts of all files of a seed's component."""
+    text = Component(seed, CALM).text().replace("HELPER", "helping_calm")
+    text = text.replace("from pathlib", "from math import sin, sqrt\nfrom pathlib", 1)
+    text = text.replace("> 3.0:", "> 0.5:")  # so that some runs are refused
+    return {f"calm_{seed}.py": text, "helping_calm.py": HELPER, "table.txt": "0.25 -0.0 1.5\n"}
 
 
 # Pools and systems
 
 
 class Made(NamedTuple):
-    """A component of a pool: what its author says, and its FMUs by their kinds."""
+    """A component of a pool: its definition, and its FMUs by their kinds."""
 
     definition: Definition
     fmus: Mapping[str, Path]
@@ -291,26 +90,19 @@ class Made(NamedTuple):
 
 def pool(seeds: Sequence[int], folder: Path) -> list[Made]:
     """The components of some seeds, built."""
-    here, found = platforms("2", None), []
-    kinds = (
-        PythonKind(best_loader()),
-        NativeKind("2", here, compiler_for(here), lambda line: None),
-    )
+    found = []
     for seed in seeds:
         for name, text in files_of(seed).items():
             (folder / name).write_text(text, encoding="utf-8")
-        source = source_of_script(folder / f"calm_{seed}.py")
-        # The files that it reads are known from now on.
-        definition = source.definition
-        fmus = {kind.name: folder / f"{kind.name}_{seed}.fmu" for kind in kinds}
-        for kind in kinds:
-            kind.write(source, fmus[kind.name])
-        found.append(Made(definition, fmus))
+        script = folder / f"calm_{seed}.py"
+        fmus = {kind: built(script, kind, folder / f"{kind}_{seed}") for kind in KINDS}
+        fmus = {kind: path.with_suffix(".fmu") for kind, path in fmus.items()}
+        found.append(Made(source_of_script(script).definition, fmus))
     return found
 
 
 class Drawn(NamedTuple):
-    """A system on paper.
+    """A system, its experiment, and the components that it needs.
 
     Attributes:
         parts: its components by their names, which are those of a pool.
@@ -326,14 +118,14 @@ class Drawn(NamedTuple):
     is_tuned: bool
 
     def plan(self, kind: str) -> Plan:
-        """What runs with FMUs of a kind."""
+        """Plan of a run with FMUs of a kind."""
         return make_plan(
             replace(self.system, components=components(self.parts, kind)), self.experiment
         )
 
     @property
     def definitions(self) -> dict[str, Definition]:
-        """Of all components."""
+        """Definitions of all components."""
         return {name: made.definition for name, made in self.parts.items()}
 
 
@@ -343,7 +135,7 @@ def components(parts: Mapping[str, Made], kind: str) -> dict[str, Fmu]:
 
 
 def drawn(seed: int, made: Sequence[Made]) -> Drawn:
-    """The system of a seed, of components of a pool."""
+    """Draw a system of components of a pool."""
     draw = Random(seed)
     names = draw.sample(NAMES, draw.randint(2, 6))
     parts = {name: draw.choice(made) for name in names}
@@ -411,14 +203,10 @@ def _change(source: Any, target: Any, draw: Random) -> (Linear | Mapped) | None:
 def _parameters(system: System, draw: Random) -> Iterator[tuple[PortName, Any]]:
     """Values of parameters, and of inputs that nothing feeds."""
     fed = {connection.target for connection in system.connections}
-    refusing = draw.choice([*system.components]) if draw.random() < 0.4 else None
     for name, component in system.components.items():
         for variable in (*component.having("parameter"), *component.having("input")):
             port = PortName(name, variable.name)
-            if variable.name == "limit":
-                if name == refusing:
-                    yield port, draw.uniform(0.3, 3.0)
-            elif variable.name == H_MAX:
+            if variable.name == H_MAX:
                 if draw.random() < 0.5:
                     yield port, draw.choice((0.011, 0.05, 1.0))
             elif port not in fed and draw.random() < 0.5:
@@ -440,7 +228,7 @@ def _value(variable: Any, draw: Random) -> Any:
 
 
 class Run(NamedTuple):
-    """What a run has come to.
+    """Outcome of a run.
 
     Attributes:
         rows: a column for each name, time first.
@@ -468,35 +256,28 @@ def run_of_fmus(plan: Plan) -> Run:
 
 def run_of_program(text: Text, path: Path) -> Run:
     """A run of a program."""
-    found = play(text, path)
-    refused = found.refused if found.outcome else None
-    return _told(text, found.rows, found.has_begun, refused)
-
-
-def _told(text: Text, rows: np.ndarray, has_begun: bool, refused: tuple[int, int] | None) -> Run:
-    """What a program has come to, with the number of what refuses, and of steps before that."""
-    failure = ""
-    if refused is not None:
-        component, made = refused
-        at = f"stopped at t = {text.plan.experiment.time(made):.12g} s: " * has_begun
+    found, failure = play(text, path), ""
+    if found.outcome:
+        component, made = found.refused
+        at = f"stopped at t = {text.plan.experiment.time(made):.12g} s: " * found.has_begun
         failure = f"{at}{text.components[component]}"
     names = ("time", *map(str, text.columns))
-    return Run(dict(zip(names, rows.T, strict=True)), failure, has_begun)
+    return Run(dict(zip(names, found.rows.T, strict=True)), failure, found.has_begun)
 
 
 class Ways:
-    """The ways in which programs are made of the components of a pool."""
+    """Ways to make programs of the components of a pool."""
 
-    def __init__(self, made: Sequence[Made], folder: Path, *options: object) -> None:
-        self._folder, self._options = folder, ("-DAPART=", *options)
+    def __init__(self, made: Sequence[Made], folder: Path) -> None:
+        self._folder = folder
         self._shared = Equations((one.definition for one in made), (), is_tuned=True)
-        self._object = compiled(self._shared.apart(), folder / "equations.o", *self._options, "-c")
+        self._object = compiled(self._shared.apart(), folder / "equations.o", "-DAPART=", "-c")
 
     def programs(self, of: Drawn, number: int) -> Iterator[tuple[str, Text, Path]]:
         """Programs of a system, each with the name of the way in which it was made."""
         plan, place = of.plan(NATIVE), self._folder / f"{number}"
         text = Text(plan, of.definitions, alters=True, shared=self._shared)
-        options = *self._options, self._object, "-shared"
+        options = "-DAPART=", self._object, "-shared"
         yield "alters", text, compiled(text.apart(), place.with_suffix(".a.so"), *options)
         is_quick = number % 2 == 1
         text = Text(plan, of.definitions, is_tuned=of.is_tuned, is_quick=is_quick)
@@ -504,78 +285,17 @@ class Ways:
         yield QUICK if text.is_quick else "careful", text, library
 
 
-# The page
-
-
-def runs_in_node(texts: Sequence[Text], folder: Path) -> list[Run]:
-    """Runs of programs as a module of the page, all of the same equations."""
-    sources = {"equations": Source(texts[0].equations.apart())}
-    sources |= {f"p{i}": Source(text.apart(), *OF_PROGRAM) for i, text in enumerate(texts)}
-    (folder / MODULE).write_bytes(module.compiled(sources)[MODULE])
-    given = [
-        {
-            "number": i,
-            "values": values_of(text),
-            "times": (of.start_time, of.step, of.stop_time),
-            "fullSteps": of.full_steps,
-            "steps": of.rows - 1,
-            "width": 1 + len(text.columns),
-        }
-        for i, text in enumerate(texts)
-        for of in [text.plan.experiment]
-    ]
-    script = Path(__file__).with_name("in_node.mjs")
-    process = subprocess.run(
-        ["node", script, folder / MODULE],
-        input=json.dumps(given),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return [
-        _told(
-            text,
-            np.frombuffer(b64decode(one["rows"])).reshape(-1, 1 + len(text.columns)),
-            one["hasBegun"],
-            None if one["isWhole"] else (one["component"], one["made"]),
-        )
-        for text, one in zip(texts, json.loads(process.stdout), strict=True)
-    ]
-
-
-def findings_in_node(seed: int, systems: int) -> list[str]:
-    """Where runs of a module of the page differ from those of the same programs here.
-
-    Both have the same sine and its like: C libraries differ in their last bits.
-    """
-    first = seed * COMPONENTS
-    with TemporaryDirectory() as temporary:
-        folder = Path(temporary)
-        try:
-            made = pool(range(first, first + COMPONENTS), folder)
-            ways = Ways(made, folder, "-include", SAME_FUNCTIONS)
-            numbers = range(seed * systems, (seed + 1) * systems)
-            found = [next(ways.programs(drawn(number, made), number)) for number in numbers]
-            pages = runs_in_node([text for _, text, _ in found], folder)
-        finally:
-            _forget(folder)
-        runs = (run_of_program(text, library) for _, text, library in found)
-        return [
-            said for run, page in zip(runs, pages, strict=True) if (said := difference(run, page))
-        ]
-
-
 # Findings
 
 #: The way of programs that are checked once a step.
 QUICK = "quick"
 
-#: How a run of a system ends.
+#: Ends of a run.
 WHOLE, REFUSED, NOT_BEGUN = "to the end", "refused later", "refused at the start"
 
 
 class Outcome(NamedTuple):
-    """What a system has come to.
+    """Outcome of a system.
 
     Attributes:
         system: its name.
@@ -590,7 +310,7 @@ class Outcome(NamedTuple):
 
 
 def outcomes(seed: int, systems: int = SYSTEMS) -> Iterator[Outcome]:
-    """What the systems of a pool come to."""
+    """Run the systems of a pool."""
     first = seed * COMPONENTS
     with TemporaryDirectory() as temporary:
         folder = Path(temporary)
@@ -604,7 +324,7 @@ def outcomes(seed: int, systems: int = SYSTEMS) -> Iterator[Outcome]:
 
 
 def _forget(folder: Path) -> None:
-    """Let modules of a folder be imported from another."""
+    """Forget the modules of a folder, so that others may have their names."""
     place = str(folder.resolve())
     sys.path.remove(place)
     for name, known in [*sys.modules.items()]:
@@ -627,7 +347,7 @@ def _outcome(of: Drawn, ways: Ways, number: int) -> Outcome:
 
 
 def difference(wanted: Run, found: Run, is_quick: bool = False) -> str:
-    """Where a run differs, in words: a program says only which component refuses, and when."""
+    """The first difference of a run: a program reports only which component refuses, and when."""
     if is_quick and wanted.failure and found.failure:
         # It does not say what it was, nor when.
         return ""
@@ -644,23 +364,6 @@ def difference(wanted: Run, found: Run, is_quick: bool = False) -> str:
     return f"{m} rows, not {n}" if m != n else ""
 
 
-def main() -> int:
-    """Command line."""
-    parser = argparse.ArgumentParser(prog="python -m fuzz.systems", description=__doc__)
-    parser.add_argument("--runs", type=int, default=10, help="pools (default: %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="of the first pool")
-    options = parser.parse_args()
-    ends, wrong = Counter[str](), 0
-    for seed in range(options.seed, options.seed + options.runs):
-        for one in outcomes(seed):
-            ends[one.end] += 1
-            wrong += bool(one.findings)
-            for said in one.findings:
-                print(f"seed {seed}, {one.system}: {said}", flush=True)
-    told = ", ".join(f"{n} {end}" for end, n in ends.items())
-    print(f"{ends.total()} systems ({told}), {wrong} of them differ")
-    return 1 if wrong else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+def findings(seed: int) -> list[str]:
+    """List the differences in the systems of a pool."""
+    return [f"{one.system}: {line}" for one in outcomes(seed) for line in one.findings]

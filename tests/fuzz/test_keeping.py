@@ -1,8 +1,9 @@
-"""What is the user's stays the user's, whatever it is called and whatever is written beside it.
+"""No command loses a file of the user's, whatever its name and whatever files are near it.
 
-Folders full of files with names that the program itself uses go through every command that writes:
-each byte of the user's must be there afterwards, in its place or, with `--force`, moved aside. And
-what the program reads back is damaged, a bit at a time: it is refused or said, or nothing differs.
+Every command that writes runs in folders full of files whose names the program itself uses: each
+byte of the user's must be there afterwards, at its path or, with `--force`, moved. And files that
+the program reads back are damaged, a bit at a time: it refuses or reports that, or the result is
+the same.
 
     pytest tests/fuzz/test_keeping.py --hypothesis-profile=attack -m ''
 """
@@ -49,7 +50,7 @@ from support.runs import InThisProcess
 from support.tiers import slow
 
 #: Examples of each command; with the profile `attack` some hundred times as many.
-EXAMPLES = max(settings.default.max_examples // 10, 8)
+EXAMPLES = max(settings.default.max_examples // 10, 4)
 
 STUDIES = all(map(find_spec, ("pyarrow", "scipy")))
 
@@ -114,7 +115,7 @@ contents_of_files = st.one_of(
 
 
 class Folder(NamedTuple):
-    """What is in a folder before a command.
+    """Contents of a folder before a command.
 
     Attributes:
         ran: whether a run of ours has written into it before.
@@ -148,13 +149,13 @@ folders = st.builds(
 
 @pytest.fixture(autouse=True)
 def _no_module_of_that_name() -> None:
-    """Other tests have one, for which `new` would refuse the name."""
+    """Forget modules of other tests, for which `new` would refuse the name."""
     sys.modules.pop("own", None)
 
 
 @pytest.fixture(scope="module")
 def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What commands read: a result, a study, a script, and scenarios of odd names."""
+    """Inputs of commands: a result, a study, a script, and scenarios of odd names."""
     folder = tmp_path_factory.mktemp("here")
     current_fmus()
     assert main([*RUN, "--out", str(folder / "result")]) == 0
@@ -167,7 +168,7 @@ def here(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def quick(here: Path) -> Iterator[None]:
-    """Without what takes seconds and writes elsewhere: compilers, processes, most of a report."""
+    """Replace slow steps that write elsewhere: compilers, processes, most of a report."""
 
     def copied(module: str, folder: Path, *options: str, **_: object) -> list[Path]:
         source = current_fmus() if module == "build" else here / "own"
@@ -223,7 +224,7 @@ def snapshot(folder: Path) -> dict[str, bytes | str]:
 
 
 def fill(folder: Path, outside: Path, what: Folder) -> None:
-    """Put files and links of the user's where nothing else is."""
+    """Write the user's files and links where no other files are."""
     for name, content in what.files.items():
         path = folder / name
         if not os.path.lexists(path) and not path.name.startswith("/"):
@@ -241,7 +242,7 @@ def fill(folder: Path, outside: Path, what: Folder) -> None:
 
 
 def call(arguments: list[str]) -> tuple[int, str]:
-    """Exit status of a command, and what it says."""
+    """Exit status of a command, and its errors."""
     said = StringIO()
     with redirect_stderr(said), redirect_stdout(StringIO()):
         status = main(arguments)
@@ -249,7 +250,7 @@ def call(arguments: list[str]) -> tuple[int, str]:
 
 
 def is_kept(name: str, content: bytes | str, after: dict[str, bytes | str]) -> bool:
-    """Whether a file of the user's is there, or was moved aside, it or a folder that it is in."""
+    """True if a user's file, or a folder around it, is there or was moved aside."""
     if after.get(name) == content:
         return True
     parts = Path(name).parts
@@ -262,7 +263,7 @@ def is_kept(name: str, content: bytes | str, after: dict[str, bytes | str]) -> b
 
 
 def representatives(names: Iterable[str], *fast: str) -> list[Any]:
-    """All of them, of which but a few are tried fast."""
+    """All names as parameters, only some of them fast."""
     return [*fast, *slow(*(name for name in names if name not in fast))]
 
 
@@ -312,7 +313,7 @@ def test_every_file_of_the_users_stays(here: Path, name: str):
 
 
 def flipped(folder: Path, place: float, bit: int) -> str:
-    """Change a bit of the files below a folder; the name of the file."""
+    """Change a bit of the files below a folder, and return the name of the file."""
     files = sorted(path for path in folder.rglob("*") if path.is_file() and path.stat().st_size)
     # Each file as often as any other, however long it is.
     share, file = modf(place * len(files))
@@ -324,7 +325,7 @@ def flipped(folder: Path, place: float, bit: int) -> str:
 
 
 def stop_after(n: int, what: type, method: str) -> Callable[[], None]:
-    """Have this process killed when a method has been called so often."""
+    """Return a function that kills this process after `n` calls of a method."""
 
     def prepare() -> None:
         called, left = getattr(what, method), [n]
@@ -358,12 +359,12 @@ if STUDIES:
         COMMANDS["sweep"],
     )
 
-#: What says when something was made, or how long that took.
+#: Times and durations in files.
 TIMES = re.compile(rb'"(started|seconds|command|resumed_at)": .*|Written by .*')
 
 
 def made(folder: Path) -> dict[str, bytes]:
-    """The files of a folder without times, without ledgers and what was being written."""
+    """The files of a folder without times, ledgers and unfinished files."""
     found = {name: TIMES.sub(b"", content) for name, content in contents(folder).items()}
     return {name: found[name] for name in found if not name.startswith(".auv-fmu-")}
 

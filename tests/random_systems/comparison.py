@@ -1,4 +1,4 @@
-"""Runs of random systems beside what they must show."""
+"""Runs of random systems, compared with an independent evaluator."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ TOLERANCE = 1e-9
 #: fiftyfold a step: so many rows are looked at.
 _GROWING, _SOON = 1e-6, 5
 
-#: How many of so many systems run isolated as well.
+#: One in so many systems also runs isolated.
 _ISOLATED = 25
 
-#: What a run comes to; it is undecided where a system has no solution that is known well enough.
+#: Outcomes; undecided: the system has no solution that is known well enough.
 EQUAL, DIFFERS, REFUSED, UNDECIDED = "equal", "differing", "refused", "undecided"
 
 
 class Outcome(NamedTuple):
-    """What one run came to.
+    """Outcome of a run.
 
     Attributes:
         seed: of the system.
@@ -85,12 +85,12 @@ def outcomes(seed: int) -> Iterator[Outcome]:
             if seed % _ISOLATED == 0 and order == default:
                 ways.append({"isolate": True})
             if order == default:
-                # Nobody need name it.
+                # The default.
                 ways[0]["order"] = None
             for way in ways:
                 how = f"{text} {way.get('loop', 'isolated')}"
                 try:
-                    system = path if random.random() < 0.5 or drawn.as_scenario else load(path)
+                    system = path if random.random() < 0.5 else load(path)
                     result = simulate(
                         system,
                         step=drawn.step,
@@ -116,10 +116,16 @@ def outcomes(seed: int) -> Iterator[Outcome]:
                 yield Outcome(seed, how, DIFFERS if why else EQUAL, why or "")
 
 
+def findings(seed: int) -> list[str]:
+    """List the runs of a system that differ or are refused."""
+    wrong = (one for one in outcomes(seed) if one.what not in (EQUAL, UNDECIDED))
+    return [f"{one.how}: {one.what}: {one.why}" for one in wrong]
+
+
 def difference(
     result: Result, rows: Sequence[dict[str, Any]], tolerance: float = TOLERANCE
 ) -> str | None:
-    """The first value that is not what it must be, in words."""
+    """Describe the first value that differs; None: there is none."""
     for name in rows[0]:
         found, wanted = result[name][: len(rows)], [row[name] for row in rows]
         if isinstance(wanted[0], float):

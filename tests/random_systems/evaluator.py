@@ -1,11 +1,11 @@
-"""What a system shows in every row, by brute force: from its description, and from no schedule.
+"""The rows of a system by brute force: from its description, without a schedule.
 
-Formulas are computed as they stand; nothing here is taken from the master.
+Formulas are computed as they stand; no code of the master is used.
 
-Feedthrough order follows from what FMI says of a communication point: there an output is a function
+Feedthrough order follows from FMI's communication points: there an output is a function
 of the states, the inputs and the time (FMI 2.0.4, section 2.2.8), and doStep leads from one point
 to the next with the inputs of the first (section 4.2.2). So a row holds what is true at its time:
-every input has what feeds it, and every output follows from the inputs of the same row.
+every input has the value that feeds it, and every output follows from the inputs of its row.
 """
 
 from __future__ import annotations
@@ -48,27 +48,15 @@ class NoSolution(Exception):
 
 
 _OPERATORS: dict[str, Callable[..., Any]] = {
-    "+": lambda a, b: a + b,
-    "-": lambda a, b: a - b,
-    "*": lambda a, b: a * b,
-    "/": lambda a, b: a / b,
-    "sin": sin,
-    "tanh": tanh,
-    "sqrt": sqrt,
-    "log": log,
-    "max": max,
-    "mod": fmod,
-    "floor": floor,
-    ">": lambda a, b: a > b,
-    "or": lambda a, b: bool(a or b),
-    "not": lambda a: not a,
-    "same": lambda a, b: a == b,
-    "pick": lambda a, b, c: b if a else c,
-}
+    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b, "/": lambda a,
+    b: a / b, "sin": sin, "tanh": tanh, "sqrt": sqrt, "log": log, "max": max, "mod": fmod,
+    "floor": floor, ">": lambda a, b: a > b, "or": lambda a, b: bool(a or b),
+    "not": lambda a: not a, "same": lambda a, b: a == b, "pick": lambda a, b, c: b if a else c,
+}  # fmt: skip
 
 
 def value_of(formula: Formula, scope: Mapping[Any, Any]) -> Any:
-    """A formula, with values of what it is computed from."""
+    """Compute a formula from the values of its leaves."""
     operator, *rest = formula
     match operator:
         case "number" | "text":
@@ -84,16 +72,13 @@ def arriving(drawn: Drawn, wire: Wire, value: Any) -> Any:
     """A value at the end of a wire."""
     source = drawn.parts[wire.source[0]].fmu.named(wire.source[1])
     target = drawn.parts[wire.target[0]].fmu.named(wire.target[1])
-    unit = source.unit
-    for hop in wire.hops:
-        if hop.unit != unit:
-            a, b = UNITS[unit], UNITS[hop.unit]
-            value = (a.factor * value + a.offset - b.offset) / b.factor
-            unit = hop.unit
-        if hop.linear is not None:
-            value = hop.linear[0] * value + hop.linear[1]
-        if hop.mapped:
-            value = dict(hop.mapped).get(value, value)
+    if source.unit != target.unit:
+        a, b = UNITS[source.unit], UNITS[target.unit]
+        value = (a.factor * value + a.offset - b.offset) / b.factor
+    if wire.linear is not None:
+        value = wire.linear[0] * value + wire.linear[1]
+    if wire.mapped:
+        value = dict(wire.mapped).get(value, value)
     return typed(target, value)
 
 
@@ -109,7 +94,7 @@ def typed(variable: Variable, value: Any) -> Any:
 
 
 class Machine:
-    """A component at work."""
+    """A component during a run."""
 
     def __init__(self, part: Part, start_time: float) -> None:
         self.fmu, self.time = part.fmu, start_time
@@ -119,7 +104,7 @@ class Machine:
             if one.causality != "output"
         }
         self.states = [state.start for state in part.fmu.states]
-        # What is computed in steps only, between them.
+        # Outputs that are computed only in steps, between these.
         self._held: dict[str, Any] = {}
 
     def _scope(self, h: float = 0.0) -> dict[Any, Any]:
@@ -132,7 +117,7 @@ class Machine:
         return scope
 
     def output(self, name: str) -> Any:
-        """An output with the inputs, states and time of now, or those of the end of the step."""
+        """An output with the present inputs, states and time, or as held since the last step."""
         if name in self._held:
             return self._held[name]
         value = value_of(self.fmu.outputs[name], self._scope())
@@ -155,14 +140,14 @@ class Machine:
 
 
 def has_feedthrough(fmu: Fmu, output: str) -> bool:
-    """Whether an output depends on an input of the same instant, as far as is declared."""
+    """True if an output depends, as declared, on an input of the same instant."""
     if fmu.declares in (ABSENT, UNLISTED):
         return True
     return bool(fmu.having("input") if fmu.declares == ALL else fmu.needs(output))
 
 
 def follows(fmu: Fmu) -> bool:
-    """Whether any output that is a Real follows any input that is one, at once."""
+    """True if any Real output follows any Real input at once."""
     return fmu.responds and any(
         fmu.named(one).type == "Real"
         for output in fmu.having("output")
@@ -182,7 +167,7 @@ def default_order(drawn: Drawn) -> str:
 
 
 def components(nodes: Sequence[Any], edges: Iterable[tuple[Any, Any]]) -> list[list[Any]]:
-    """The strongly connected components of a graph, what feeds others before them."""
+    """Strongly connected components of a graph, sources first."""
     reach = reached(nodes, edges)
     left = [{node} | {other for other in reach[node] if node in reach[other]} for node in nodes]
     groups = [sorted(group, key=nodes.index) for group in left]
@@ -228,7 +213,7 @@ class Evaluation:
         self.rows: list[dict[str, Any]] = []
         self._run()
 
-    # What depends on what
+    # Dependencies
 
     def _feedthrough(self, wire: Wire) -> bool:
         return has_feedthrough(self.drawn.parts[wire.source[0]].fmu, wire.source[1])
@@ -287,7 +272,7 @@ class Evaluation:
             late |= opened
 
     def _batches(self) -> list[list[list[str]]]:
-        """What is stepped one after the other; rings that do not feed each other, together."""
+        """Groups of units in the order of their steps; rings without a connection step together."""
         found: list[list[list[str]]] = []
         rings = [set(ring) for ring in self.rings]
         for members in self._sequence():
@@ -300,7 +285,7 @@ class Evaluation:
         return found
 
     def _at_once_along(self) -> list[tuple[str, str]]:
-        """Which component takes the new outputs of which."""
+        """Pairs of components: the second takes new outputs of the first."""
         return [
             (wire.source[0], wire.target[0])
             for wire in self.drawn.wires
@@ -308,7 +293,7 @@ class Evaluation:
         ]
 
     def _sequence(self) -> list[list[str]]:
-        """What is stepped one after the other: components, and rings as one."""
+        """Units in the order of their steps: components, and rings as one."""
         names = list(self.drawn.parts)
         members: dict[str, list[str]] = {}
         for name in names:
@@ -320,7 +305,7 @@ class Evaluation:
             return [members[unit] for unit in units]
         edges = [(self.unit[a], self.unit[b]) for a, b in self._at_once_along()]
         edges = [(a, b) for a, b in edges if a != b]
-        # Rings come after all that does not wait for them.
+        # Rings come last among the units that are ready.
         rings = {ring[0] for ring in self.rings}
         left, found = list(members), []
         while left:
@@ -333,13 +318,13 @@ class Evaluation:
     # Values
 
     def _hand(self, wire: Wire, value: Any) -> Any:
-        """Let an input take a value, and say what arrived."""
+        """Set an input, and return the value that arrived."""
         arrived = arriving(self.drawn, wire, value)
         self.machines[wire.target[0]].values[wire.target[1]] = arrived
         return arrived
 
     def _settle(self, wires: Sequence[Wire]) -> None:
-        """Let inputs be what feeds them, whatever follows from what."""
+        """Set inputs to the outputs that feed them, in the order of their dependencies."""
         by_target = {wire.target: wire for wire in wires}
         sources = list(dict.fromkeys(wire.source for wire in wires))
         edges = [
@@ -378,7 +363,7 @@ class Evaluation:
         self._newton(wires)
 
     def _round(self, wires: Sequence[Wire]) -> float:
-        """One after the other; the largest change, as a share."""
+        """Hand values along the wires once, and return the largest relative change."""
         most = 0.0
         for wire in wires:
             machine, port = self.machines[wire.target[0]], wire.target[1]
@@ -464,7 +449,7 @@ class Evaluation:
             self._run_in_feedthrough_order(shown)
             return
         spans, batches = self._steps(), self._batches()
-        # What will be shown once the time has come that it belongs to.
+        # Outputs that are shown later, with their times.
         waiting: dict[Port, tuple[int, Any]] = {}
         for k, (t, _) in enumerate(spans):
             before = dict(shown)
@@ -492,7 +477,7 @@ class Evaluation:
             self._show(shown)
 
     def _is_flat(self, name: str) -> bool:
-        """Whether no output that is a Real follows a small change of any input that is one."""
+        """True if no Real output follows a small change of any Real input."""
         machine, found = self.machines[name], []
         outputs = [one.name for one in machine.fmu.having("output") if one.type == "Real"]
         for one in machine.fmu.having("input"):
@@ -505,7 +490,7 @@ class Evaluation:
         return all(found)
 
     def _run_in_feedthrough_order(self, shown: dict[Port, Any]) -> None:
-        """Steps, each to a time at which every input takes what feeds it then."""
+        """Make steps; after each, every input takes the value that feeds it at that time."""
         parts, spans = self.drawn.parts, self._steps()
         for wire in self.drawn.wires:
             if self._feedthrough(wire) and self._is_flat(wire.source[0]):
@@ -564,11 +549,11 @@ class Evaluation:
         }
 
     def _at_once(self, port: Port) -> bool:
-        """Whether an output is seen as soon as it is computed."""
+        """True if an output is seen as soon as it is computed."""
         return self.order != JACOBI and has_feedthrough(self.drawn.parts[port[0]].fmu, port[1])
 
     def _renew(self, members: Sequence[str], shown: Mapping[Port, Any]) -> None:
-        """Let a ring have the latest of what feeds it."""
+        """Give a ring the latest values of its sources."""
         if inner := self._inner(members):
             for wire in self._outer(members):
                 self._hand(wire, shown[wire.source])

@@ -1,4 +1,4 @@
-"""Systems out of a seed, and the archives that they are written in.
+"""Systems from a seed, and their archives.
 
 All Reals stand for a number of the size of one, in a unit of their own: whatever a chain of units
 and transformations makes of them, loops have the gain that their formulas are drawn with.
@@ -37,22 +37,11 @@ class Quantity(NamedTuple):
 
 
 UNITS = {
-    "kg": Unit("kg"),
-    "g": Unit("kg", 1e-3),
-    "t": Unit("kg", 1e3),
-    "K": Unit("K"),
-    "degC": Unit("K", 1.0, 273.15),
-    "rad": Unit("rad"),
-    "deg": Unit("rad", 0.017453292519943295),
-    "m/s": Unit("m s"),
-    "km/h": Unit("m s", 1.0 / 3.6),
-}
-_BASES = {
-    "kg": 'kg="1"',
-    "K": 'K="1"',
-    "rad": 'rad="1"',
-    "m s": 'm="1" s="-1"',
-}
+    "kg": Unit("kg"), "g": Unit("kg", 1e-3), "t": Unit("kg", 1e3), "K": Unit("K"),
+    "degC": Unit("K", 1.0, 273.15), "rad": Unit("rad"), "deg": Unit("rad", 0.017453292519943295),
+    "m/s": Unit("m s"), "km/h": Unit("m s", 1.0 / 3.6),
+}  # fmt: skip
+_BASES = {"kg": 'kg="1"', "K": 'K="1"', "rad": 'rad="1"', "m s": 'm="1" s="-1"'}
 QUANTITIES = {
     "mass": Quantity(("kg", "g", "t"), 0.0, 5.0),
     "temperature": Quantity(("K", "degC"), 280.0, 10.0),
@@ -62,7 +51,7 @@ QUANTITIES = {
 
 ITEMS = ("low", "medium", "high", "top")
 
-#: What an output declares that it depends on.
+#: Declarations of the dependencies of outputs.
 RIGHT, ABSENT, UNLISTED, ALL = DECLARATIONS = ("right", "absent", "unlisted", "all")
 
 _TEXTS = ("calm", "storm", "fog", "x")
@@ -101,7 +90,7 @@ class Variable:
 
 @dataclass
 class State:
-    """What an FMU keeps: its first value, and a formula for the next one."""
+    """A state of an FMU: its first value, and a formula for the next one."""
 
     start: Any
     next: Formula = ("number", 0.0)
@@ -141,30 +130,21 @@ class Fmu:
         return {leaf[1] for leaf in leaves(self.outputs[output]) if leaf[0] == "input"}
 
 
-class Hop(NamedTuple):
-    """What happens on the way to the next connector.
+@dataclass
+class Wire:
+    """A connection of a component's output with a component's input.
 
     Attributes:
-        connector: name of a connector of a system; empty: it is the target itself.
-        unit: of that connector; empty: none.
-        linear: factor and offset.
+        source, target: component and port.
+        linear: factor and offset, after the units are those of the target.
         mapped: pairs of values.
 
     """
 
-    connector: str = ""
-    unit: str = ""
-    linear: tuple[float, float] | None = None
-    mapped: tuple[tuple[Any, Any], ...] = ()
-
-
-@dataclass
-class Wire:
-    """A connection of a component's output with a component's input, through other connectors."""
-
     source: tuple[str, str]
     target: tuple[str, str]
-    hops: list[Hop] = field(default_factory=lambda: [Hop()])
+    linear: tuple[float, float] | None = None
+    mapped: tuple[tuple[Any, Any], ...] = ()
 
 
 @dataclass
@@ -172,7 +152,7 @@ class Part:
     """A component.
 
     Attributes:
-        name: of it; before a dot stands the system that it is in.
+        name: of it.
         fmu: that it is an instance of.
         values: of parameters and inputs that nothing feeds, as they are in the end.
         hidden: values that others win over.
@@ -186,17 +166,12 @@ class Part:
     hidden: dict[str, Any] = field(default_factory=dict)
     every: int = 1
 
-    @property
-    def group(self) -> str:
-        return self.name.rpartition(".")[0]
-
 
 @dataclass
 class Drawn:
-    """A system, with its parts in the order in which they stand in the file.
+    """A system, with its parts in the order of the file.
 
     Attributes:
-        as_scenario: whether it is written as one.
         strong: whether values that go round its rings may grow.
 
     """
@@ -207,12 +182,11 @@ class Drawn:
     step: float
     start_time: float
     stop_time: float
-    as_scenario: bool
     strong: bool
 
 
 def leaves(formula: Formula) -> list[Formula]:
-    """The ends of a formula: what it is computed from."""
+    """The leaves of a formula: numbers, variables, states and the time."""
     if formula[0] in ("number", "text", "input", "parameter", "state", "time", "length"):
         return [formula]
     return [leaf for operand in formula[1:] for leaf in leaves(operand)]
@@ -271,12 +245,11 @@ def in_unit(variable: Variable, formula: Formula) -> Formula:
 
 
 class _Draw:
-    """One system in the making."""
+    """A system while it is drawn."""
 
     def __init__(self, seed: int) -> None:
         self.random = Random(seed)
         self.seed = seed
-        self.as_scenario = self.random.random() < 0.12
         self.parts: dict[str, Part] = {}
         self.wires: list[Wire] = []
         # Shares of FMUs that compute outputs when asked, and of outputs with feedthrough.
@@ -314,12 +287,10 @@ class _Draw:
         slow = self.chance(0.1 if self.tight else 0.3)
         for part in self.parts.values():
             part.every = random.choice((1, 1, 2, 3)) if slow else 1
-        start = 0.0 if self.as_scenario else random.choice((0.0, 0.0, 0.0, 3.0, 1.1, -2.5))
+        start = random.choice((0.0, 0.0, 0.0, 3.0, 1.1, -2.5))
         steps = random.randint(3, 9) + (random.choice((0.0, 0.0, 0.5, 0.25)))
         stop = start + steps * step
-        return Drawn(
-            self.seed, self.parts, self.wires, step, start, stop, self.as_scenario, self.strong
-        )
+        return Drawn(self.seed, self.parts, self.wires, step, start, stop, self.strong)
 
     def _make_parts(self, n: int) -> None:
         random = self.random
@@ -336,14 +307,7 @@ class _Draw:
         fmus: list[Fmu] = []
         names = [f"c{i}" for i in range(n)]
         random.shuffle(names)
-        groups = [""]
-        if not self.as_scenario and self.chance(0.4):
-            groups = ["", "s", "s.inner", "r"][: random.randint(2, 4)]
-        placed = sorted(
-            (f"{group}.{name}".lstrip(".") for name in names for group in [random.choice(groups)]),
-            key=lambda name: names.index(name.rpartition(".")[2]),
-        )
-        for name in _in_file_order(placed):
+        for name in names:
             if fmus and self.chance(0.15):
                 fmu = random.choice(fmus)
             else:
@@ -353,7 +317,6 @@ class _Draw:
 
     def _fmu(self, name: str, kinds: list[str], quantities: list[str], declares: str) -> Fmu:
         random = self.random
-        end = ".v" if self.as_scenario else ""
         variables = []
         for causality, letter, most in (
             ("input", "u", 3),
@@ -364,9 +327,7 @@ class _Draw:
                 kind = random.choice(kinds if causality != "parameter" else ["Real", *kinds])
                 quantity = random.choice(quantities) if kind == "Real" else ""
                 unit = random.choice(QUANTITIES[quantity].units) if quantity else ""
-                if self.as_scenario and quantity:
-                    unit = QUANTITIES[quantity].units[0]
-                blank = Variable(f"{letter}{i}{end}", causality, kind, None, quantity, unit)
+                blank = Variable(f"{letter}{i}", causality, kind, None, quantity, unit)
                 start = None if causality == "output" else self._value(blank)
                 variables.append(Variable(blank.name, causality, kind, start, quantity, unit))
         capabilities = [
@@ -387,7 +348,7 @@ class _Draw:
         )
 
     def _value(self, variable: Variable) -> Any:
-        """Something that an input or a parameter can be."""
+        """A value for an input or a parameter."""
         random = self.random
         match variable.kind:
             case "Real":
@@ -396,7 +357,7 @@ class _Draw:
             case "Positive":
                 return self.between(0.6, 1.6)
             case "Boolean":
-                # Rings of truth values begin with what makes all of them rest.
+                # Rings of truth values begin with the value at which all of them rest.
                 return variable.causality == "parameter" and self.chance(0.5)
             case "String":
                 return random.choice(_TEXTS)
@@ -404,7 +365,7 @@ class _Draw:
                 return 1 if variable.causality == "input" else random.randint(1, 4)
 
     def _wire(self, style: str) -> None:
-        """Feed inputs; which outputs are near is the shape of the system."""
+        """Feed inputs from outputs; the style decides which outputs are near."""
         random = self.random
         names = list(self.parts)
         random.shuffle(names)
@@ -441,7 +402,7 @@ class _Draw:
                     (other, output)
                     for other in nearby
                     for output in self.parts[other].fmu.having("output")
-                    if _fits(output, variable, self.as_scenario)
+                    if _fits(output, variable)
                 ]
                 if sources:
                     other, output = random.choice(sources)
@@ -471,7 +432,7 @@ class _Draw:
         return ("tanh", plain(self.random.choice(found))) if found and self.chance(0.3) else None
 
     def _weighted(self, fmu: Fmu, most: float) -> Formula:
-        """A sum of inputs, of which no change of one comes out greater than this."""
+        """A sum of inputs; no change of an input comes out greater than `most`."""
         chosen = self._some(self._inputs(fmu))
         terms: list[Formula] = [number(self.signed(0.1, 0.5))]
         for variable in chosen:
@@ -610,92 +571,42 @@ class _Draw:
                         part.hidden[variable.name] = self._value(variable)
 
     def _transform(self) -> None:
-        """Connectors of systems on the way, and transformations."""
-        share = 0.0 if self.as_scenario else self.random.choice((0.0, 0.2, 0.5))
-        for k, wire in enumerate(self.wires):
+        """Transformations of connections."""
+        share = self.random.choice((0.0, 0.2, 0.5))
+        for wire in self.wires:
             source = self.parts[wire.source[0]].fmu.named(wire.source[1])
             target = self.parts[wire.target[0]].fmu.named(wire.target[1])
-            ups, downs = passed(wire.source[0], wire.target[0])
-            units = QUANTITIES[source.quantity].units if source.unit else ("",)
             inside = wire.source[0] in self.ringed and wire.target[0] in self.ringed
-            hops = []
-            for i in range(len(ups) + len(downs) + 1):
-                last = i == len(ups) + len(downs)
-                hop = Hop(
-                    "" if last else f"w{k}", target.unit if last else self.random.choice(units)
-                )
-                if self.chance(share if source.type == "Real" or not share else 0.5):
-                    hop = self._transformed(hop, source, target, inside, mapped=last)
-                hops.append(hop)
-            wire.hops = hops
+            if self.chance(share if source.type == "Real" or not share else 0.5):
+                self._transformed(wire, source, target, inside)
 
-    def _transformed(
-        self, hop: Hop, source: Variable, target: Variable, inside: bool, mapped: bool
-    ) -> Hop:
+    def _transformed(self, wire: Wire, source: Variable, target: Variable, inside: bool) -> None:
         random = self.random
         if source.kind == "Real" and target.kind == "Real":
             factor = self.signed(0.3, 0.95)
-            probe = Variable("", "", "Real", None, source.quantity, hop.unit)
-            one, zero = _scale(probe)
-            offset = one * self.signed(0.05, 0.2) + (1.0 - factor) * zero
-            return hop._replace(linear=(factor, offset))
-        if inside or not mapped or source.kind != target.kind:
-            return hop
-        if source.kind == "Boolean":
-            return hop._replace(mapped=((False, True), (True, random.choice((True, False)))))
-        if source.kind in _COUNTED:
+            one, zero = _scale(target)
+            wire.linear = factor, one * self.signed(0.05, 0.2) + (1.0 - factor) * zero
+        elif inside or source.kind != target.kind:
+            return
+        elif source.kind == "Boolean":
+            wire.mapped = ((False, True), (True, random.choice((True, False))))
+        elif source.kind in _COUNTED:
             keys = random.sample(range(1, 5), random.randint(1, 3))
-            return hop._replace(mapped=tuple((key, random.randint(1, 4)) for key in keys))
-        return hop
+            wire.mapped = tuple((key, random.randint(1, 4)) for key in keys)
 
 
-def _fits(output: Variable, variable: Variable, same_unit: bool) -> bool:
+def _fits(output: Variable, variable: Variable) -> bool:
     if variable.kind in _COUNTED:
         return output.kind in _COUNTED
     if variable.kind == "Real" and output.kind == "Integer":
         return not variable.unit
-    if same_unit and output.unit != variable.unit:
-        return False
     return output.kind == variable.kind and output.quantity == variable.quantity
-
-
-def passed(source: str, target: str) -> tuple[list[str], list[str]]:
-    """The systems that a connection leaves, and those that it enters, by their names."""
-    leaves, enters = _groups(source), _groups(target)
-    common = [group for group in leaves if group in enters]
-    return (
-        [group for group in reversed(leaves) if group not in common],
-        [group for group in enters if group not in common],
-    )
-
-
-def _groups(name: str) -> list[str]:
-    """The systems around a component below the top, the outermost first."""
-    words = name.split(".")[:-1]
-    return [".".join(words[: i + 1]) for i in range(len(words))]
-
-
-def _in_file_order(names: list[str]) -> list[str]:
-    """Names as they stand in a file that keeps what is in one system together."""
-    placed: dict[str, Any] = {}
-    for name in names:
-        inner = placed
-        for word in name.split("."):
-            inner = inner.setdefault(word, {})
-
-    def walk(inner: dict[str, Any], before: str) -> list[str]:
-        found = []
-        for word, more in inner.items():
-            found += walk(more, f"{before}{word}.") if more else [before + word]
-        return found
-
-    return walk(placed, "")
 
 
 def reached(
     nodes: Iterable[Hashable], edges: Iterable[tuple[Hashable, Hashable]]
 ) -> dict[Any, set[Any]]:
-    """What can be reached from each node along one edge or several."""
+    """The nodes that can be reached from each node along one edge or several."""
     after: dict[Any, set[Any]] = {node: set() for node in nodes}
     for a, b in edges:
         after[a].add(b)
@@ -742,7 +653,7 @@ def _word(value: Any) -> str:
 
 
 def model_text(fmu: Fmu) -> str:
-    """What the FMU computes, as its library reads it."""
+    """The formulas of an FMU, as its library reads them."""
 
     def counted(formula: Formula) -> str:
         words = _postfix(fmu, formula)
@@ -803,112 +714,45 @@ def description(fmu: Fmu) -> str:
 
 
 def write(drawn: Drawn, folder: Path) -> Path:
-    """A system as an archive, or as a scenario beside its FMUs."""
+    """Write a system as an archive."""
     fmus = {part.fmu.name: part.fmu for part in drawn.parts.values()}
     for name, fmu in fmus.items():
         model = {"model.txt": model_text(fmu)}
         small_fmus.write(folder / f"{name}.fmu", description(fmu), _SOURCE, resources=model)
-    if drawn.as_scenario:
-        return _scenario(drawn, folder)
-    return _archive(drawn, folder, list(fmus))
-
-
-def _scenario(drawn: Drawn, folder: Path) -> Path:
-    def port(end: tuple[str, str]) -> str:
-        return f'"{".".join(end).removesuffix(".v")}"'
-
-    def table(name: str, lines: list[str]) -> list[str]:
-        return ["", f"[{name}]", *lines] if lines else []
-
-    parts = drawn.parts.values()
-    values = [
-        f'"{part.name}.{name}" = {toml(part.fmu.named(name), value)}'
-        for part in parts
-        for name, value in part.values.items()
-    ]
-    lines = [
-        f"stop_time = {drawn.stop_time!r}",
-        f"step = {drawn.step!r}",
-        f"only = [{', '.join(repr(part.name) for part in parts)}]",
-        *table("components", [f'{part.name} = "{part.fmu.name}.fmu"' for part in parts]),
-        *table("wires", [f"{port(wire.target)} = {port(wire.source)}" for wire in drawn.wires]),
-        *table("parameters", values),
-        *table(
-            "steps",
-            [f"{part.name} = {part.every * drawn.step!r}" for part in parts if part.every > 1],
-        ),
-    ]
-    path = folder / "system.toml"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return path
-
-
-def toml(variable: Variable, value: Any) -> str:
-    return f'"{value}"' if variable.kind == "String" else literal(value)
-
-
-def _archive(drawn: Drawn, folder: Path, fmus: list[str]) -> Path:
     random = Random(drawn.seed)
     files: dict[str, str | Path] = {
         f"resources/{name}.fmu": folder / f"{name}.fmu" for name in fmus
     }
-    connections: dict[str, list[str]] = {}
-    connectors: dict[str, dict[str, str]] = {}
-    for wire in drawn.wires:
-        _connect(drawn, wire, connections, connectors, random)
-
-    def bound(part: Part) -> tuple[str, dict[str, str]]:
-        """Bindings of a component, and values that the system around it sets."""
-        if not part.values:
-            return "", {}
-        inner, outer = {}, {}
+    inner: list[str] = []
+    outer: dict[str, str] = {}
+    for part in drawn.parts.values():
+        own = {}
         for name, value in part.values.items():
             text = _parameter(part.fmu.named(name), value)
             if name in part.hidden:
-                inner[name] = _parameter(part.fmu.named(name), part.hidden[name])
-                outer[f"{part.name.rpartition('.')[2]}.{name}"] = text
+                own[name] = _parameter(part.fmu.named(name), part.hidden[name])
+                outer[f"{part.name}.{name}"] = text
             else:
-                inner[name] = text
-        if random.random() < 0.5:
-            return archives.binding(inner), outer
-        file = f"parameters/{part.name}.ssv"
-        files[file] = archives.parameter_set(inner)
-        return archives.binding(source=file), outer
-
-    def group(name: str) -> str:
-        own: dict[str, list[str]] = {}
-        outer: dict[str, str] = {}
-        for part in drawn.parts.values():
-            if part.group == name:
-                bindings, further = bound(part)
-                outer |= further
-                hint = ""
-                if part.every > 1:
-                    hint = _hint(part.every * drawn.step)
-                own[part.name] = [
-                    archives.component(
-                        part.name.rpartition(".")[2],
-                        f"resources/{part.fmu.name}.fmu",
-                        bindings,
-                        type="application/x-fmu-sharedlibrary",
-                    ).replace("</ssd:Component>", f"{hint}</ssd:Component>")
-                ]
-            elif not name or part.name.startswith(f"{name}."):
-                rest = part.name.removeprefix(f"{name}.") if name else part.name
-                below = f"{name}.{rest.split('.')[0]}".lstrip(".")
-                if below not in own:
-                    own[below] = [group(below)]
-        wires = connections.get(name, [])
-        random.shuffle(wires)
-        return archives.system(
-            "".join(text for texts in own.values() for text in texts),
-            "".join(wires),
-            "".join(connectors.get(name, {}).values()),
-            name=name.rpartition(".")[2] or "top",
-            bindings=archives.binding(outer) if outer else "",
+                own[name] = text
+        bindings = archives.binding(own) if own else ""
+        if own and random.random() < 0.5:
+            file = f"parameters/{part.name}.ssv"
+            files[file] = archives.parameter_set(own)
+            bindings = archives.binding(source=file)
+        hint = _hint(part.every * drawn.step) if part.every > 1 else ""
+        fmu = f"resources/{part.fmu.name}.fmu"
+        component = archives.component(
+            part.name, fmu, bindings, type="application/x-fmu-sharedlibrary"
         )
-
-    text = archives.described(group(""))
+        inner.append(component.replace("</ssd:Component>", f"{hint}</ssd:Component>"))
+    wires = [
+        archives.connection(*map(".".join, (wire.source, wire.target)), _inside(drawn, wire))
+        for wire in drawn.wires
+    ]
+    random.shuffle(wires)
+    bindings = archives.binding(outer) if outer else ""
+    system = archives.system("".join(inner), "".join(wires), "", name="top", bindings=bindings)
+    text = archives.described(system)
     # The units and items of these systems, in the place of those.
     items = "".join(
         f'<ssc:Item name="{name}" value="{i}"/>' for i, name in enumerate(ITEMS, start=1)
@@ -937,55 +781,19 @@ def _parameter(variable: Variable, value: Any) -> str:
     return f'{variable.type} value="{literal(value)}"'
 
 
-def _connect(
-    drawn: Drawn,
-    wire: Wire,
-    connections: dict[str, list[str]],
-    connectors: dict[str, dict[str, str]],
-    random: Random,
-) -> None:
-    """Write a connection, with the connectors of the systems that it passes."""
-    source = drawn.parts[wire.source[0]].fmu.named(wire.source[1])
-    target = drawn.parts[wire.target[0]].fmu.named(wire.target[1])
-    ups, downs = passed(wire.source[0], wire.target[0])
-    at = (wire.source[0], wire.source[1])
-    for hop, (kind, group) in zip(
-        wire.hops,
-        [*(("output", up) for up in ups), *(("input", down) for down in downs), ("", "")],
-        strict=True,
-    ):
-        to = (group, hop.connector) if kind else wire.target
-        if kind:
-            of = source.type
-            text = archives.connector(hop.connector, kind, hop.unit, of)
-            text = text.replace('name="Speed"', 'name="Level"')
-            connectors.setdefault(group, {})[hop.connector] = text
-        # The system that the connection is stated in is the one around both ends, or one end.
-        inside = group if kind == "output" else to[0].rpartition(".")[0]
-        ends = [_end(name, connector, inside) for name, connector in (at, to)]
-        connections.setdefault(inside, []).append(
-            archives.connection(*ends, _inside(hop, source, target))
-        )
-        at = to
-
-
-def _end(name: str, connector: str, inside: str) -> str:
-    """An end of a connection as the system sees it that the connection is stated in."""
-    if name == inside:
-        return connector
-    return f"{name.rpartition('.')[2]}.{connector}"
-
-
-def _inside(hop: Hop, source: Variable, target: Variable) -> str:
-    if hop.linear is not None:
-        factor, offset = hop.linear
+def _inside(drawn: Drawn, wire: Wire) -> str:
+    """The transformation of a connection."""
+    if wire.linear is not None:
+        factor, offset = wire.linear
         return f'<ssc:LinearTransformation factor="{factor!r}" offset="{offset!r}"/>'
-    if not hop.mapped:
+    if not wire.mapped:
         return ""
-    name = {"Integer": "Integer", "Boolean": "Boolean", "Enumeration": "Enumeration"}[source.kind]
+    name = drawn.parts[wire.source[0]].fmu.named(wire.source[1]).kind
 
     def word(value: Any) -> str:
         return ITEMS[value - 1] if name == "Enumeration" else literal(value)
 
-    pairs = "".join(f'<ssc:MapEntry source="{word(a)}" target="{word(b)}"/>' for a, b in hop.mapped)
+    pairs = "".join(
+        f'<ssc:MapEntry source="{word(a)}" target="{word(b)}"/>' for a, b in wire.mapped
+    )
     return f"<ssc:{name}MappingTransformation>{pairs}</ssc:{name}MappingTransformation>"

@@ -16,7 +16,7 @@ typedef struct {
     char text[LENGTH];
 } Value;
 
-/* What a copy of the state has to hold. */
+/* The contents of a state. */
 typedef struct {
     Value variables[VARIABLES], states[STATES];
     double rates[VARIABLES];

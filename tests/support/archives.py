@@ -138,7 +138,7 @@ def connector(name: str, kind: str, unit: str = "", of: str = "Real") -> str:
 
 
 def component(name: str, source: str = "a.fmu", bindings: str = "", **more: str) -> str:
-    """A component, whose connectors are those of its FMU."""
+    """A component with the connectors of its FMU."""
     inside = f"<ssd:ParameterBindings>{bindings}</ssd:ParameterBindings>" if bindings else ""
     attributes = "".join(f' {key}="{value}"' for key, value in more.items())
     return f'<ssd:Component name="{name}" source="{source}"{attributes}>{inside}</ssd:Component>'

@@ -14,14 +14,14 @@ from typing import Any
 
 BROWSER = which("chromium") or which("chromium-browser") or which("google-chrome")
 
-#: Nothing of it asks the network for anything.
+#: Options that keep it off the network.
 _OPTIONS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--remote-debugging-pipe",
 )  # fmt: skip
 
-#: Where Chromium reads and writes what is said by its protocol.
+#: File descriptors at which Chromium reads and writes its protocol.
 _READS, _WRITES = 3, 4
 
 

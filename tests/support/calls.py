@@ -1,12 +1,11 @@
-"""The calls of fmi-answers.md: with which arguments each is made, and how it is made.
+"""The calls of fmi-answers.md: their arguments, and how each is made on an instance.
 
-A call is data: it can be printed, pickled, and made again on any instance of the same FMU. States
-are named by slots, so that it does not matter where they lie in memory.
+States are named by slots, so that their addresses do not matter.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from ctypes import (
     addressof,
     byref,
@@ -47,7 +46,7 @@ UNKNOWN = 4_294_967_295
 #: Byte 0xff, which no UTF-8 has, as a string that keeps it (`surrogateescape`).
 NOT_UTF_8 = "\udcff"
 
-#: Times a reference stands in the longest calls.
+#: Number of references in the longest calls.
 MANY = 100_000
 
 #: The functions of FMI 2.0 that only model exchange has.
@@ -66,23 +65,6 @@ class Call(NamedTuple):
     case: str
     arguments: Arguments
 
-    def shown(self, description: Description) -> str:
-        """The call as a line to be read."""
-        said = dict(self.arguments)
-        names = {v.reference: v.name for v in description.variables}
-        if "items" in said:
-            items = said.pop("items")
-            values = [f"{names.get(item.reference, item.reference)}={_short(item.value)}"
-                      for item in items[:4]]  # fmt: skip
-            said[""] = ", ".join([*values, "..."] if len(items) > len(values) else values)
-        text = ", ".join(f"{key}={_short(value)}" if key else value for key, value in said.items())
-        return f"{self.function}({text})" + (f"   # {self.case}" if self.case else "")
-
-
-def _short(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:50]}... ({len(text)} characters)"
-
 
 class Item(NamedTuple):
     """A value reference in a call, the value for it, and whether they can go together."""
@@ -94,7 +76,7 @@ class Item(NamedTuple):
 
 @dataclass
 class Saved:
-    """The states that a host has, by slot, and those it has no more."""
+    """States of a host by slot, and those that it has freed."""
 
     states: dict[str, int] = field(default_factory=dict)
     freed: dict[str, int] = field(default_factory=dict)
@@ -103,35 +85,27 @@ class Saved:
 
 
 class Lacking(Exception):
-    """An FMU has no port, or no state was saved, that a case needs."""
+    """An FMU has no port for a case."""
+
+
+#: Slots of states: of the instance itself, of another one, and freed.
+OWN, OTHER, FREED = "own", "other", "freed"
 
 
 @dataclass
 class Draw:
-    """What arguments are drawn from."""
+    """Arguments for calls on an FMU."""
 
     random: Random
     description: Description
-    #: Slots of states of instances of this FMU, own and others.
-    own: list[str] = field(default_factory=list)
-    others: list[str] = field(default_factory=list)
-    freed: list[str] = field(default_factory=list)
-    time: float = 0.0
-    #: Stop time; infinite: the host has not defined one.
-    stop: float = inf
-    #: What slots of this instance begin with.
-    prefix: str = ""
-    #: Values of parameters that are others than at the start, by name.
-    values: Mapping[str, Any] = field(default_factory=dict)
-
-    def slot(self) -> str:
-        return f"{self.prefix}s{self.random.randrange(4)}"
+    time: float
+    stop: float
 
     def any_of(self, found: Sequence[T]) -> T:
-        """One of what there is to choose from.
+        """One of several things.
 
         Raises:
-            Lacking: there is nothing.
+            Lacking: there is none.
 
         """
         if not found:
@@ -139,7 +113,7 @@ class Draw:
         return self.random.choice(found)
 
     def good_value(self, variable: Variable) -> Any:
-        """One that a run goes on well with."""
+        """A value that does not end a run."""
         start, low, high = variable.start, variable.minimum, variable.maximum
         if choices := choices_of(self.description.name, variable.name):
             return self.random.choice(choices)
@@ -148,17 +122,10 @@ class Draw:
         if variable.type == "Boolean":
             return self.random.randrange(2)
         if variable.type == "Integer":
-            some = (-(2**31), -1, 0, 1, 42, 2**31 - 1) if low is None else (start,)
-            return self.random.choice(some)
-        spread = trials_of(self.description.name).spread
-        value = (start or 0.0) * self.random.uniform(1.0 - spread, 1.0 + spread)
-        value = value or self.random.uniform(-0.5, 0.5)
+            return self.random.choice((-(2**31), 0, 42) if low is None else (start,))
+        value = self.random.uniform(0.99, 1.01) * (start or 0.1)
         value = value if low is None else max(low, value)
         return value if high is None else min(high, value)
-
-    def value(self, variable: Variable) -> Any:
-        """What a parameter is now."""
-        return self.values.get(variable.name, variable.start)
 
     def settable(self, fmi_type: str) -> list[Variable]:
         """Ports that can be set before the initialisation."""
@@ -166,14 +133,8 @@ class Draw:
         return [*of("input", fmi_type), *of("parameter", fmi_type)]
 
 
-#: The case of a Boolean that is no truth value of C.
-ODD_TRUTH = "neither 0 nor 1, which is true"
-
 #: The case of a step that ends too late.
 BEYOND = "a step beyond the stop time"
-
-#: The case of a fixed parameter that keeps its value.
-SAME = "a fixed parameter, to the value that it has"
 
 CASES: dict[tuple[str, str], Callable[[Draw], Arguments | None]] = {}
 
@@ -193,6 +154,11 @@ def _case(function: str, case: str = "") -> Callable[[Any], Any]:
         return arguments
 
     return add
+
+
+def _plain(function: str, case: str = "", **arguments: Any) -> None:
+    """Add a case whose arguments are the same for all FMUs."""
+    _case(function, case)(lambda draw: dict(arguments))
 
 
 def _items(*items: Item, **more: Any) -> Arguments:
@@ -276,15 +242,15 @@ def _value_cases(fmi_type: str) -> None:
     def _fixed(draw: Draw) -> Arguments:
         variable = draw.any_of(_parameters(draw, "fixed", fmi_type))
         found = [draw.good_value(variable) for _ in range(20)]
-        others = [value for value in found if value != draw.value(variable)]
+        others = [value for value in found if value != variable.start]
         if not others:
             raise Lacking
         return _item(variable, others[0])
 
-    @_case(f"fmi2Set{fmi_type}", SAME)
+    @_case(f"fmi2Set{fmi_type}", "a fixed parameter, to the value that it has")
     def _same(draw: Draw) -> Arguments:
         variable = draw.any_of(_parameters(draw, "fixed", fmi_type))
-        return _item(variable, draw.value(variable))
+        return _item(variable, variable.start)
 
     if fmi_type in ("Real", "Boolean"):
         _case(f"fmi2Set{fmi_type}", "an output")(
@@ -322,9 +288,7 @@ _case("fmi2GetReal", "100,000 times the same")(
 
 
 def _bad(
-    case: str,
-    found: Callable[[Draw], list[Variable]],
-    value: Callable[[Variable, Random], float],
+    case: str, found: Callable[[Draw], list[Variable]], value: Callable[[Variable, Random], float]
 ) -> None:
     """Add a case of a Real port and a value that it does not take."""
 
@@ -381,10 +345,10 @@ _case("fmi2GetReal", "all Integers and Booleans")(
 )
 
 
-@_case("fmi2SetBoolean", ODD_TRUTH)
+@_case("fmi2SetBoolean", "neither 0 nor 1, which is true")
 def _odd_boolean(draw: Draw) -> Arguments:
     found = draw.description.of("parameter", "Boolean")
-    port = draw.any_of([variable for variable in found if not draw.value(variable)])
+    port = draw.any_of([variable for variable in found if not variable.start])
     return _item(port, draw.random.choice((2, -1, 2**31 - 1)))
 
 
@@ -414,9 +378,7 @@ for _case_name, _arguments in (
     ("a category that is NULL", {"on": 1, "categories": [None]}),
     ("a category that is not UTF-8", {"on": 1, "categories": [NOT_UTF_8]}),
 ):
-    _case("fmi2SetDebugLogging", _case_name)(
-        lambda draw, arguments=_arguments: {"null": False, **arguments}
-    )
+    _plain("fmi2SetDebugLogging", _case_name, **{"null": False, **_arguments})
 
 
 def _one_of(function: str, before: Callable[[Draw], Arguments], case: str, **values: Any) -> None:
@@ -445,14 +407,14 @@ _setup(
 )
 _setup("start NaN or infinite", start=(nan, inf, -inf))
 
-for _mode_call in (
+for _function in (
     "fmi2EnterInitializationMode",
     "fmi2ExitInitializationMode",
     "fmi2Terminate",
     "fmi2Reset",
     "fmi2CancelStep",
 ):
-    _case(_mode_call)(lambda draw: {})
+    _plain(_function)
 
 
 def _setting(found: Setting | None) -> Setting:
@@ -485,8 +447,6 @@ _step("a time that is NaN or infinite", time=(nan, inf, -inf))
 
 @_case("fmi2DoStep", BEYOND)
 def _beyond(draw: Draw) -> Arguments:
-    if draw.stop == inf:
-        raise Lacking
     return {"time": draw.time, "h": draw.stop - draw.time + draw.random.choice((0.02, 1e3))}
 
 
@@ -504,69 +464,47 @@ def _overflow(draw: Draw) -> Arguments:
 
 # States
 
-_case("fmi2GetFMUstate")(lambda draw: {"slot": draw.slot()})
-_case("fmi2GetFMUstate", "into a state from before")(
-    lambda draw: {"slot": draw.any_of(draw.own), "again": True}
-)
+_plain("fmi2GetFMUstate", slot="new")
+_plain("fmi2GetFMUstate", "into a state from before", slot=OWN, again=True)
 for _state_call in (
     "fmi2SetFMUstate",
     "fmi2FreeFMUstate",
     "fmi2SerializedFMUstateSize",
     "fmi2SerializeFMUstate",
 ):
-    _case(_state_call, "a state")(lambda draw: {"slot": draw.any_of(draw.own)})
-    _case(_state_call, "a state that was freed")(lambda draw: {"freed": draw.any_of(draw.freed)})
-    _case(_state_call, "NULL")(lambda draw: {"null": True})
+    _plain(_state_call, "a state", slot=OWN)
+    _plain(_state_call, "a state that was freed", freed=FREED)
+    _plain(_state_call, "NULL", null=True)
     if _state_call != "fmi2SerializeFMUstate":
-        _case(_state_call, "a pointer to something else")(lambda draw: {"stray": True})
-_case("fmi2FreeFMUstate", "a state that is NULL")(lambda draw: {"nothing": True})
-_case("fmi2SetFMUstate", "a state of another instance")(
-    lambda draw: {"slot": draw.any_of(draw.others)}
-)
-_case("fmi2SetFMUstate", "a state that was serialised")(
-    lambda draw: {"bytes of": draw.any_of(draw.own), "change": None}
-)
+        _plain(_state_call, "a pointer to something else", stray=True)
+_plain("fmi2FreeFMUstate", "a state that is NULL", nothing=True)
+_plain("fmi2SetFMUstate", "a state of another instance", slot=OTHER)
+_plain("fmi2SetFMUstate", "a state that was serialised", bytes_of=OWN)
 for _case_name, _change in (
     ("bytes that are not a state", "noise"),
     ("bytes that were cut off", "cut"),
     ("bytes that were changed", "changed"),
     ("values that no run leads to, checksum and all", "impossible"),
 ):
-    _case("fmi2SetFMUstate", _case_name)(
-        lambda draw, change=_change: {
-            "bytes of": draw.any_of(draw.own),
-            "change": change,
-            "seed": draw.random.randrange(2**32),
-        }
-    )
-_case("fmi2SetFMUstate", "bytes of another FMU's state")(lambda draw: {"foreign": True})
-for _case_name, _arguments in (
-    ("too few bytes", {"more": (-1,)}),
-    ("too many bytes", {"more": (1, 8, 1000, 2**40)}),
-    ("bytes NULL", {"no bytes": True}),
-):
-    _one_of(
-        "fmi2SerializeFMUstate",
-        lambda draw: {"slot": draw.any_of(draw.own)},
-        _case_name,
-        **_arguments,
-    )
-_case("fmi2GetFMUstate", "NULL")(lambda draw: {"null": True})
-_case("fmi2DeSerializeFMUstate", "bytes of a state")(
-    lambda draw: {"bytes of": draw.any_of(draw.own)}
+    _plain("fmi2SetFMUstate", _case_name, bytes_of=OWN, change=_change)
+_plain("fmi2SetFMUstate", "bytes of another FMU's state", foreign=True)
+_plain("fmi2SerializeFMUstate", "too few bytes", slot=OWN, more=-1)
+_plain("fmi2SerializeFMUstate", "too many bytes", slot=OWN, more=1000)
+_plain("fmi2SerializeFMUstate", "bytes NULL", slot=OWN, no_bytes=True)
+_plain("fmi2GetFMUstate", "NULL", null=True)
+_plain("fmi2DeSerializeFMUstate", "bytes of a state", bytes_of=OWN)
+_plain(
+    "fmi2DeSerializeFMUstate",
+    "bytes that are not a state, refused when they are set",
+    bytes=b"[" * 5000,
 )
-_case("fmi2DeSerializeFMUstate", "bytes that are not a state, refused when they are set")(
-    lambda draw: {"bytes": draw.random.choice((b"[" * 5000, b"\xff\x00", b"{}", b"null"))}
-)
-_case("fmi2DeSerializeFMUstate", "n = 0")(lambda draw: {"bytes": b""})
+_plain("fmi2DeSerializeFMUstate", "n = 0", bytes=b"")
 for _state_call in ("fmi2GetFMUstate", "fmi2DeSerializeFMUstate"):
-    _case(_state_call, "into a state that was freed")(
-        lambda draw: {"bytes": b"{}", "freed": draw.any_of(draw.freed)}
-    )
-_case("fmi2DeSerializeFMUstate", "bytes NULL, n > 0")(lambda draw: {"no bytes": True})
-_case("fmi2DeSerializeFMUstate", "state NULL")(lambda draw: {"bytes": b"{}", "null": True})
+    _plain(_state_call, "into a state that was freed", bytes=b"{}", freed=FREED)
+_plain("fmi2DeSerializeFMUstate", "bytes NULL, n > 0", no_bytes=True)
+_plain("fmi2DeSerializeFMUstate", "state NULL", bytes=b"{}", null=True)
 
-# What is not supported
+# Unsupported functions
 
 _UNSUPPORTED = (
     "fmi2SetRealInputDerivatives",
@@ -575,29 +513,24 @@ _UNSUPPORTED = (
     *MODEL_EXCHANGE_FUNCTIONS,
 )
 for _function in _UNSUPPORTED:
-    _case(_function, "anything")(lambda draw: {})
-for _kind_of_status, _named, _number in (
-    ("Real", "fmi2LastSuccessfulTime", LAST_SUCCESSFUL_TIME_KIND),
-    ("Boolean", "fmi2Terminated", TERMINATED_KIND),
+    _plain(_function, "anything")
+for _function, _case_name, _number in (
+    ("fmi2GetRealStatus", "fmi2LastSuccessfulTime", LAST_SUCCESSFUL_TIME_KIND),
+    ("fmi2GetBooleanStatus", "fmi2Terminated", TERMINATED_KIND),
 ):
-    for _case_name, _arguments in (
-        (_named, {"kind": _number}),
-        ("another kind", {"kind": 0}),
-        ("NULL", {"kind": _number, "null": True}),
-    ):
-        _case(f"fmi2Get{_kind_of_status}Status", _case_name)(
-            lambda draw, arguments=_arguments: dict(arguments)
-        )
+    _plain(_function, _case_name, kind=_number)
+    _plain(_function, "another kind", kind=0)
+    _plain(_function, "NULL", kind=_number, null=True)
 for _function in ("fmi2GetStatus", "fmi2GetIntegerStatus", "fmi2GetStringStatus"):
-    _case(_function, "anything")(lambda draw: {"kind": draw.random.randrange(4)})
-    _case(_function, "NULL")(lambda draw: {"kind": draw.random.randrange(4), "null": True})
+    _plain(_function, "anything", kind=1)
+    _plain(_function, "NULL", kind=1, null=True)
 
 
 # Making calls
 
 
 def make(host: Host, call: Call, saved: Saved) -> Status:
-    """Make a call on an instance; what it gives is checked as far as it does not depend on it."""
+    """Make a call on an instance; results that are the same in all states are checked."""
     how = _MADE.get(call.function)
     return host.call(call.function) if how is None else how(host, call, saved)
 
@@ -654,7 +587,7 @@ def _make_step(host: Host, call: Call, saved: Saved) -> Status:
     return host.step(call.arguments["time"], call.arguments["h"])
 
 
-#: Memory that is no state and no instance.
+#: Memory that holds neither a state nor an instance.
 _STRAY = create_string_buffer(256)
 
 
@@ -683,7 +616,7 @@ def _make_get_state(host: Host, call: Call, saved: Saved) -> Status:
 
 
 def _make_set_state(host: Host, call: Call, saved: Saved) -> Status:
-    if not call.arguments.keys().isdisjoint(("bytes", "bytes of", "foreign")):
+    if not call.arguments.keys().isdisjoint(("bytes", "bytes_of", "foreign")):
         status, state = host.deserialised(_content(host, call, saved))
         assert status == Status.OK, f"fmi2DeSerializeFMUstate: {status.name}"
         status = host.set_state(state)
@@ -696,12 +629,12 @@ def _make_set_state(host: Host, call: Call, saved: Saved) -> Status:
 def _content(host: Host, call: Call, saved: Saved) -> bytes:
     if "foreign" in call.arguments:
         return saved.foreign
-    if "bytes of" not in call.arguments:
+    if "bytes_of" not in call.arguments:
         content: bytes = call.arguments["bytes"]
         return content
-    content = host.serialised(saved.states[call.arguments["bytes of"]])
+    content = host.serialised(saved.states[call.arguments["bytes_of"]])
     change = call.arguments.get("change")
-    return states.changed(content, change, call.arguments["seed"]) if change else content
+    return states.changed(content, change) if change else content
 
 
 def _make_free_state(host: Host, call: Call, saved: Saved) -> Status:
@@ -729,7 +662,7 @@ def _make_serialise(host: Host, call: Call, saved: Saved) -> Status:
     more = call.arguments.get("more", 0)
     room = create_string_buffer(b"\xaa" * (len(content) + 64), len(content) + 64)
     size = len(content) + more
-    target = None if call.arguments.get("no bytes") else room
+    target = None if call.arguments.get("no_bytes") else room
     status = host.call(call.function, c_void_p(handle), target, c_size_t(size))
     written = string_at(room, len(room))
     if target is not None and status == Status.OK:
@@ -743,7 +676,7 @@ def _make_serialise(host: Host, call: Call, saved: Saved) -> Status:
 
 def _make_deserialise(host: Host, call: Call, saved: Saved) -> Status:
     state = c_void_p(_handle(call, saved))
-    if call.arguments.get("no bytes"):
+    if call.arguments.get("no_bytes"):
         return host.call(call.function, None, c_size_t(8), byref(state))
     content = _content(host, call, saved)
     target = None if call.arguments.get("null") else byref(state)

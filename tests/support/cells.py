@@ -1,21 +1,55 @@
-"""One cell of fmi-answers.md held against an FMU: the call, what it changes, what comes after."""
+"""The cells of docs/reference/fmi-answers.md, tried on an FMU.
+
+A trial makes the call of a cell, then looks at what it has changed and at what comes after.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import shutil
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from ctypes import addressof, c_int, c_void_p
 from functools import cache
+from pathlib import Path
 from random import Random
-from typing import NamedTuple
+from tempfile import TemporaryDirectory
+from typing import Any, NamedTuple
 from xml.etree import ElementTree
 
 from fmus.discovery import source_of
 from fmus.kinds import PYTHON
 from fmus.ports.description import fmi2_description
 from support import states
-from support.calls import BEYOND, CASES, Call, Draw, Saved, make
-from support.raw import Description, Host, Library, Status, Variable, description_in, instance
+from support.calls import BEYOND, CASES, FREED, MANY, OTHER, OWN, Call, Draw, Saved, make
+from support.fmi3 import Fmi3Library
+from support.raw import (
+    MODEL_EXCHANGE,
+    Description,
+    Host,
+    Library,
+    Status,
+    Variable,
+    description_in,
+    harmless,
+    instance,
+)
 from support.settings import Setting, Trials, trials_of
-from support.status_table import ERROR, Cell, Row, rows
+from support.status_table import (
+    CREATION,
+    ERROR,
+    WITHOUT_AN_INSTANCE,
+    Cell,
+    Row,
+    creations,
+    rows,
+    without_an_instance,
+)
+
+#: Another kind: FMUs in C of FMI 3.0, called by the functions of FMI 2.0.
+FMI3 = "FMI 3.0"
+
+#: Function and case of a row.
+Key = tuple[str, str]
 
 #: Step of the trials [s], and how many come before the state stepping is tried.
 H, STEPS = 0.02, 3
@@ -24,15 +58,84 @@ H, STEPS = 0.02, 3
 STOP = 1.0
 
 #: The rows that need values of their own.
-_SETTINGS: Mapping[tuple[str, str], Callable[[Trials], Setting | None]] = {
+_SETTINGS: Mapping[Key, Callable[[Trials], Setting | None]] = {
     ("fmi2DoStep", "values that the equations overflow with"): lambda trials: trials.overflow,
     ("fmi2ExitInitializationMode", "values that give no start"): lambda trials: trials.no_start,
     ("fmi2GetReal", "outputs of values that give no start"): lambda trials: trials.no_start,
 }
 
+_NOT_UTF_8 = b"ta\xffnh"
+
+#: Arguments of fmi2Instantiate that make a call differ from a good one.
+CREATIONS: dict[str, dict[str, Any]] = {
+    "everything as it should be": {},
+    "a name that is empty": {"name": b""},
+    "a name of white space": {"name": b" \t\n"},
+    "a name of 100,000 characters": {"name": b"n" * MANY},
+    "a name that is NULL": {"name": None},
+    "a name that is not UTF-8": {"name": _NOT_UTF_8},
+    "the type fmi2ModelExchange": {"kind": MODEL_EXCHANGE},
+    "a GUID that is NULL": {"guid": None},
+    "a GUID that is empty": {"guid": b""},
+    "a GUID of another FMU": {"guid": b"{8c4e810f-3df3-4a00-8276-176fa3c9f9e0}"},
+    "a GUID that is not UTF-8": {"guid": _NOT_UTF_8},
+    "a resource location that is NULL": {"location": None},
+    "a resource location that does not exist": {"location": b"file:///nowhere/to/be/found"},
+    "a resource location that is not UTF-8": {"location": b"file:///" + _NOT_UTF_8},
+    "callbacks that are NULL": {"callbacks": "none"},
+    "callbacks without a logger": {"callbacks": "no logger"},
+    "logging off": {"logging": False},
+}
+
+
+def mistakes(
+    folder: Path, other: Path, kind: str, key: Key, states: Sequence[str]
+) -> dict[str, str]:
+    """Answers of an FMU that differ from the cells of a row, by state.
+
+    Args:
+        folder: of the unpacked FMU.
+        other: of another FMU, which lends a state.
+        kind: of both, or :data:`FMI3`.
+        key: of the row.
+        states: columns.
+
+    """
+    library, company = _prepared(folder, other, kind)
+    found = {}
+    for state in states:
+        try:
+            _check(library, company, kind, key, state)
+        except Exception as error:  # PythonFMU may leave the exception of an earlier trial.
+            found[state] = f"{type(error).__name__}: {error}".splitlines()[0]
+    return found
+
+
+def _check(library: Library, company: Company, kind: str, key: Key, state: str) -> None:
+    function, case = key
+    if function == CREATION:
+        _check_creation(library, case, creations(kind)[case])
+    elif function == WITHOUT_AN_INSTANCE:
+        _check_without_an_instance(library, case)
+    else:
+        _check_cell(library, key, state, company)
+
+
+@cache
+def _prepared(folder: Path, other: Path, kind: str) -> tuple[Library, Company]:
+    """The library of an FMU, and what its trials need beside it."""
+    load = Fmi3Library if kind == FMI3 else Library
+    library = load(folder)
+    with instance(load(other)) as foreign:
+        content = foreign.content()
+    beside = Host(library)
+    assert beside.instantiate()
+    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
+    return library, Company(beside, content)
+
 
 class Company(NamedTuple):
-    """What there is beside the instance of a trial."""
+    """Instances and states that a trial needs in addition."""
 
     other: Host  #: another instance of the same FMU, stepping
     foreign: bytes  #: a serialised state of another FMU
@@ -40,44 +143,22 @@ class Company(NamedTuple):
 
 @cache
 def has_call(name: str, key: tuple[str, str]) -> bool:
-    """Whether a component has the ports that the call of a row is about."""
+    """True if a component has the ports for the call of a row."""
     return CASES[key](_draw(_description(name))) is not None
 
 
 @cache
 def _description(name: str) -> Description:
-    """What the FMU of a component says of itself, without building it."""
+    """Description of a component's FMU, without building it."""
     text = fmi2_description(source_of(name).definition, "")
     return description_in(ElementTree.fromstring(text), PYTHON)
 
 
 def _draw(description: Description, time: float = 0.0) -> Draw:
-    return Draw(Random(1), description, ["own"], ["other"], ["freed"], time, STOP)
+    return Draw(Random(1), description, time, STOP)
 
 
-def company_of(library: Library, other: Library) -> Company:
-    """Company for trials on an FMU, which another one gives a state to."""
-    with instance(other) as foreign:
-        content = foreign.content()
-    beside = Host(library)
-    assert beside.instantiate()
-    assert beside.setup() == beside.enter() == beside.exit() == Status.OK
-    return Company(beside, content)
-
-
-def check(library: Library, key: tuple[str, str], state: str, company: Company) -> None:
-    """Hold an FMU against a cell.
-
-    Args:
-        library: of the FMU.
-        key: function and case of the row.
-        state: the column.
-        company: of the instance.
-
-    Raises:
-        AssertionError: it answers otherwise.
-
-    """
+def _check_cell(library: Library, key: Key, state: str, company: Company) -> None:
     row = rows()[key]
     cell = row.cells[state]
     ways = [Trial.check_next_step]
@@ -104,8 +185,8 @@ class Trial:
         self.good = host.get_state()
         freed = host.get_state()
         self.saved = Saved(
-            {"own": host.get_state(), "other": company.other.get_state()},
-            {"freed": freed},
+            {OWN: host.get_state(), OTHER: company.other.get_state()},
+            {FREED: freed},
             company.foreign,
         )
         assert host.free_state(freed) == Status.OK
@@ -184,7 +265,7 @@ class Trial:
                 self._check_unchanged(values, content)
 
     def _status(self) -> Status:
-        """What the call is answered with: PythonFMU knows fmi2OK, and fmi2Discard of steps."""
+        """Expected status; without the loader only fmi2OK, and fmi2Discard for steps."""
         answer, library, call = self.cell.answer, self.host.library, self.call
         is_get = answer.name == "refused" and "items" in call.arguments
         if not self._is_told_late and (library.answers or not is_get):
@@ -193,13 +274,13 @@ class Trial:
 
     @property
     def _is_told_late(self) -> bool:
-        """Whether it is the next steps that tell what was refused, since no loader does."""
+        """True if only the next step reports the refusal, since there is no loader."""
         answer, is_step = self.cell.answer, self.row.function == "fmi2DoStep"
         refused = answer.fails or (answer.name == "discarded" and not is_step)
         return refused and not self.host.library.answers and not self.row.is_unsound
 
     def _check_what_is_set(self, call: Call, before: Mapping[str, object]) -> bool:
-        """Whether the call is one that changes values, and has changed only those."""
+        """True if the call changes values; it must have changed no others."""
         if not call.function.startswith("fmi2Set") or "items" not in call.arguments:
             return False
         if self.cell.answer.changes_nothing:
@@ -224,16 +305,16 @@ class Trial:
         assert _content(self.host) == content, "the state has changed"
 
     def _check_what_is_restored(self, call: Call) -> None:
-        slot = call.arguments.get("slot") or call.arguments["bytes of"]
+        slot = call.arguments.get("slot") or call.arguments["bytes_of"]
         assert self.host.content() == self.host.serialised(self.saved.states[slot])
-        self.mode = "stepping" if slot == "other" or self.state == ERROR else self.state
+        self.mode = "stepping" if slot == OTHER or self.state == ERROR else self.state
 
     def _check_as_new(self) -> None:
         with instance(self.host.library) as fresh:
             assert self.host.content() == fresh.content(), "not what a new instance is"
         self.time = 0.0
 
-    # What comes after it
+    # Later calls
 
     def check_next_step(self) -> None:
         answer = self.cell.answer
@@ -276,7 +357,7 @@ class Trial:
 
 
 def _content(host: Host) -> object:
-    """The state without `fault`; None where it cannot be read."""
+    """The state without `fault`; None if it cannot be read."""
     return states.without_fault(host.content())
 
 
@@ -285,3 +366,72 @@ def _same(variable: Variable, found: object, wanted: object) -> bool:
         assert isinstance(found, bytes)
         return found.decode() == wanted
     return bool(found) == bool(wanted) if variable.type == "Boolean" else found == wanted
+
+
+@contextmanager
+def _location(library: Library, case: str) -> Iterator[dict[str, Any]]:
+    """Make a folder with invalid resources."""
+    resources = library.folder / "resources"
+    with TemporaryDirectory(prefix="auv_fmu_resources_") as folder:
+        made = Path(folder, "resources")
+        if case == "a resource location that is a plain path":
+            made = resources
+        elif case == "a resource location that is an empty folder":
+            made.mkdir()
+        elif case == "a resource location whose slavemodule.txt is garbage":
+            _copied(resources, made)
+            (made / "slavemodule.txt").write_bytes(b"\xff\x00/../garbage\n")
+        elif case == "a resource location whose script raises":
+            _copied(resources, made)
+            (made / "raising.py").write_text("raise RuntimeError('on purpose')\n")
+            (made / "slavemodule.txt").write_text("raising")
+        else:
+            yield CREATIONS[case]
+            return
+        plain = case == "a resource location that is a plain path"
+        yield {"location": str(made).encode() if plain else made.as_uri().encode()}
+
+
+def _copied(resources: Path, made: Path) -> None:
+    if resources.exists():
+        shutil.copytree(resources, made)
+    else:
+        made.mkdir()
+
+
+def _check_creation(library: Library, case: str, possible: bool) -> None:
+    host = Host(library)
+    with _location(library, case) as arguments:
+        made = host.instantiate(**arguments)
+    assert made == possible, "an instance" if made else "no instance"
+    if made:
+        assert host.setup() == host.enter() == host.exit() == host.step(0.0, 0.02) == Status.OK
+        host.free()
+    else:
+        said = [message.text for message in host.messages]
+        assert len(said) == 1, f"{len(said)} messages: {said}"
+        assert "\n" not in said[0]
+    with instance(library) as after:
+        assert after.setup() == Status.OK, "no instance can be made any more"
+
+
+def _check_without_an_instance(library: Library, case: str) -> None:
+    with instance(library) as witness:
+        assert witness.setup() == Status.OK
+        before = witness.content()
+        target: int | None = None
+        memory = (c_int * 64)()
+        if case == "an instance that was freed":
+            gone = Host(library)
+            assert gone.instantiate()
+            target = gone.component
+            gone.free()
+        elif case == "a pointer to something else":
+            target = addressof(memory)
+        for name, arguments in harmless().items():
+            status = witness.call_on(target, name, *arguments)
+            assert f"fmi2{status.name}" == without_an_instance()[case], f"{name}: {status.name}"
+        witness.library.functions.fmi2FreeInstance(c_void_p(target))
+        assert list(memory) == [0] * 64
+        assert witness.content() == before
+        assert witness.enter() == Status.OK, "the state of another instance has changed"

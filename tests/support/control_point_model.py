@@ -1,6 +1,6 @@
 """The model the proof works on: (4) to (8), (11), (14), (15), and error dynamics, in matrices.
 
-The controller needs none of these matrices. They are here to check properties of the paper and
+The controller does not need these matrices. They are here to check properties of the paper and
 the conditions of its theorems, and never run inside an FMU, so they are numpy arrays.
 """
 
@@ -185,7 +185,7 @@ def d(vehicle: Vehicle, theta: float, psi: float, w: Matrix, dy: Matrix, ell: fl
 def d_missing(
     vehicle: Vehicle, theta: float, psi: float, w: Matrix, dy: Matrix, ell: float
 ) -> Matrix:
-    """What d of (15) lacks, (3,) [N]: linear in dy, and zero without sway and heave.
+    """The part that d of (15) lacks, (3,) [N]: linear in dy, and zero without sway and heave.
 
     C_1_bar(v) v at v = J^-1 dy - J^-1 J_delta is expanded below (14) as if C_1_bar(a) b were
     C_1_bar(b) a. (It has C_1_bar(J^-1 J_delta) = 0, so that the mixed terms as printed vanish.) And
@@ -240,13 +240,7 @@ def _forced_drift(model: ActuatedDynamics, force: Matrix, ell: float) -> Matrix:
 
 
 def chi_1(
-    vehicle: Vehicle,
-    theta: float,
-    psi: float,
-    w: Matrix,
-    dy_r: Matrix,
-    r_1: Matrix,
-    ell: float,
+    vehicle: Vehicle, theta: float, psi: float, w: Matrix, dy_r: Matrix, r_1: Matrix, ell: float
 ) -> Matrix:
     """chi_1 below (25), (3,) [N]: what (26) bounds.
 

@@ -1,4 +1,4 @@
-/* What a Cortex-M4 begins with: its stack, and a reset that turns the floating-point unit on. */
+/* Start of a Cortex-M4: its stack, and a reset that turns the floating-point unit on. */
 #include <stdint.h>
 
 extern void _start(void);

@@ -1,5 +1,5 @@
-/* The functions of FMI 2.0 as a slave has them that is written for tests and has none of its own: what
-   a host calls in any run does nothing, and what it may look for is refused. */
+/* Default functions of FMI 2.0 for slaves in C that tests write: those that a host calls in any run do
+   nothing, and all others are refused. */
 
 #include "slave.h"
 

@@ -69,7 +69,7 @@ for = 0.01
 override = { plant.water.z = 0.0 }
 """
 
-#: What takes the place of the last line.
+#: Replacements of the last line.
 ENDS = {
     "whole": '[[events]]\nwhen = "plant.eta.x < 1e9"\nstop = true',
     "chattering": _CHATTERING,

@@ -16,7 +16,7 @@ NAMES = sorted(path.stem for path in EXAMPLES.glob("*/*.py") if path.stem == pat
 
 
 def source(name: str) -> Source:
-    """What the FMU of an example is made from, as `auv-fmu build` finds it."""
+    """Source of an example's FMU, as `auv-fmu build` finds it."""
     return source_of_script(script_in(EXAMPLES / name))
 
 

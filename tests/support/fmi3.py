@@ -1,7 +1,7 @@
-"""An FMU of FMI 3.0 behind the functions of FMI 2.0.
+"""An FMU of FMI 3.0, called by the functions of FMI 2.0.
 
-Most of what fmi-answers.md says holds under the names of both versions; so what is tried on an FMU
-of FMI 2.0 is tried on one of FMI 3.0 by the same tests.
+Most rows of fmi-answers.md hold under the names of both versions; so the tests of an FMU
+of FMI 2.0 are also tests of one of FMI 3.0.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _NO_EXPERIMENT = (0, c_double(0.0), c_double(0.0), 0, c_double(0.0))
 
 
 def read_description(folder: Path) -> Description:
-    """modelDescription.xml in the words of FMI 2.0; the time is one more variable."""
+    """modelDescription.xml, with the names of FMI 2.0; the time is an additional variable."""
     root = ElementTree.parse(folder / "modelDescription.xml").getroot()
     implementation, variables = root.find("CoSimulation"), root.find("ModelVariables")
     assert implementation is not None and variables is not None
@@ -63,7 +63,7 @@ def _variable(element: ElementTree.Element) -> Variable:
 
 
 class Fmi3Library(Library):
-    """The functions of an unpacked FMU of FMI 3.0, as those of FMI 2.0."""
+    """The functions of an unpacked FMU of FMI 3.0, under their names in FMI 2.0."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -82,7 +82,7 @@ class Fmi3Library(Library):
 
 
 class _Functions:
-    """Has fmi2DoStep and the others as attributes."""
+    """Functions of FMI 2.0 as attributes, made of functions of FMI 3.0."""
 
     def __init__(self, library: CDLL, enumerations: Container[int]) -> None:
         self._library = library
@@ -165,7 +165,7 @@ class _Functions:
     def _integers(
         self, verb: str, component: c_void_p, references: Any, n: c_size_t, values: Any
     ) -> int:
-        """Call the function of integers, and that of enumerations for what is one."""
+        """Call the function for integers, and for enumerations their own."""
         wide = [i for i, one in enumerate(references or ()) if one in self._enumerations]
         if values is None or not wide or len(references) != n.value:
             function = getattr(self._library, f"fmi3{verb}Int32")

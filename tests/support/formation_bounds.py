@@ -1,4 +1,4 @@
-"""How far the references of a formation are from their leader's: what formation.md proves.
+"""Distances between the references of a formation and its leader's, as formation.md proves them.
 
 The filter of the heading takes psi', which is at most `turn_chi`, to chi', chi'' and e by transfer
 functions with a triple pole at -omega. The largest that comes out is the integral of the absolute
@@ -43,11 +43,11 @@ LAG_GAIN = 2.0 * (_GOLDEN * _GOLDEN + _GOLDEN) * exp(-_GOLDEN)
 
 
 class Bounds(NamedTuple):
-    """Of a reference in a formation, from those of its leader's."""
+    """Bounds of a reference in a formation, relative to its leader's reference."""
 
-    distance: float  #: of |y_d - y_0| [m]
-    speed: float  #: of |dy_d| [m/s]
-    acceleration: float  #: of |ddy_d| [m/s2]
+    distance: float  #: bound on |y_d - y_0| [m]
+    speed: float  #: bound on |dy_d| [m/s]
+    acceleration: float  #: bound on |ddy_d| [m/s2]
 
 
 def reference_bounds(parameters: Parameters, speed: float, acceleration: float) -> Bounds:
@@ -82,7 +82,7 @@ def reference_bounds(parameters: Parameters, speed: float, acceleration: float) 
 
 
 class Messages(NamedTuple):
-    """What is known of the messages of a link; all times are whole steps of the planner."""
+    """The messages of a link; all times are multiples of the planner's step."""
 
     period: float  #: between two that are sent [s]
     delay: tuple[float, float]  #: least and largest age of one that arrives [s]
@@ -90,7 +90,7 @@ class Messages(NamedTuple):
 
 
 class Estimate(NamedTuple):
-    """How good the estimate of a leader is, in each direction."""
+    """Errors of the estimate of a leader, in each direction."""
 
     z: float  #: bound of |z| [m]
     velocity: float  #: bound of the error of dy_hat_o [m/s]
@@ -98,7 +98,7 @@ class Estimate(NamedTuple):
 
 
 def is_stable(estimator: Estimator, period: float, delay: float) -> bool:
-    """Whether small errors vanish, with a message every period that is always as late.
+    """True if small errors vanish, with a message every period that is always as late.
 
     Between two messages z decays to phi z, and its integral is I z. So from just before one message
     to the next, z and the error q of the velocity become
@@ -125,18 +125,18 @@ def is_stable(estimator: Estimator, period: float, delay: float) -> bool:
 
 
 class Hold(NamedTuple):
-    """What becomes of z from one message to the next: factors of it."""
+    """Factors of z from one message to the next."""
 
     duration: float  #: [s]
-    phi: tuple[float, float]  #: least and most of what is left of it
-    pull: tuple[float, float]  #: least and most of what it takes from the velocity's error [1/s]
+    phi: tuple[float, float]  #: least and largest remaining share
+    pull: tuple[float, float]  #: least and largest effect of the velocity's error [1/s]
 
 
 #: Bounds of |z| that are tried, as shares of the largest z that is corrected.
 _TRIED = [0.02 * 1.15**i for i in range(28)] + [1.0]
 
 #: Norms that are tried: how much of z weighs as much as the velocity's error, over the period, and
-#: how much both together weigh more, or less, than each alone.
+#: the difference between the weight of both together and the sum of their weights.
 _WEIGHTS = [0.2 * 1.25**i for i in range(14)]
 _COUPLINGS = [0.1 * i for i in range(-9, 10)]
 
@@ -185,7 +185,7 @@ def estimate_bounds(
 
 
 def held(estimator: Estimator, age: float, steps: int, h: float, least: float) -> Hold:
-    """What becomes of z while no message comes, in steps of Euler's scheme.
+    """Change of z while no message comes, in steps of Euler's scheme.
 
     In a step z loses the share h (k_d + lambda (1 - k_d age) s(z) / z), with the age at its end,
     and the velocity's error h k_d lambda s(z).

@@ -1,4 +1,4 @@
-"""Formations to try, and a follower that gets messages."""
+"""Formations, and a follower that gets messages."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from auv_fmu.paper import motion_planner
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.motion_planner import Motion, Parameters, PlannerState
 
-#: Of section 4.1.
+#: Values of section 4.1.
 _HELIX = Parameters()
 
 

@@ -1,4 +1,4 @@
-"""The tests' hosts in C, where they find nothing, and under sanitizers with FMUs in C."""
+"""The tests' hosts in C, in a bare root folder, and under sanitizers with FMUs in C."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ def arguments_of(folder: Path) -> list[str]:
 
 
 def unpacked(fmus: Path, folder: Path, names: Sequence[str] = NAMES) -> list[str]:
-    """The same of every FMU, or of some."""
+    """Libraries and resource locations of all FMUs, or of some, as arguments of a host."""
     places = [Path(fmpy.extract(fmus / f"{name}.fmu", folder / name)) for name in names]
     return [argument for place in places for argument in arguments_of(place)]
 
 
 def libraries_of(binary: Path) -> list[Path]:
-    """The shared libraries that a binary is linked against, the loader too."""
+    """The shared libraries that a binary is linked against, and the dynamic loader."""
     said = subprocess.run(["ldd", binary], check=True, capture_output=True, text=True).stdout
     return [Path(word) for word in said.split() if word.startswith("/")]
 
 
 def bare_root(folder: Path, *binaries: Path) -> list[str]:
-    """What runs a command where there is nothing but a folder; skips where that is not allowed.
+    """Prefix of a command that runs in a bare root folder; skips if that is not allowed.
 
     Args:
         folder: in which binaries find what they are linked against, each library in its place.
@@ -93,7 +93,7 @@ def sanitize(folder: Path, what: str = MEMORY) -> Path:
 
 
 def sanitized(shared: Path, fmus: Path, name: str, what: str = MEMORY) -> Path:
-    """An FMU in C, unpacked and compiled so once for all workers."""
+    """An FMU in C, unpacked and compiled with sanitizers once for all workers."""
     folder = shared / what / name
     with hold_lock(shared, wait=True):
         if not folder.exists():
@@ -108,13 +108,13 @@ def sanitized_host(name: str, folder: Path, what: str = MEMORY) -> Path:
 
 
 class Reports:
-    """What sanitizers write into a folder."""
+    """Reports of sanitizers in a folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
     def environment(self) -> dict[str, str]:
-        """Of a process that loads such FMUs without being compiled so."""
+        """Variables of a process that loads such FMUs without being compiled so."""
         command = [str(GCC), "-print-file-name=libasan.so"]
         runtime = subprocess.run(command, check=True, capture_output=True, text=True).stdout
         log = f"log_path={self._folder / 'report'}"

@@ -25,7 +25,7 @@ def component(name: str) -> type[Component]:
 
 
 def messages_of(slave: Component) -> list[str]:
-    """What a slave has logged for the host."""
+    """Messages that a slave has logged for the host."""
     return [entry.msg for entry in slave.log_queue if entry.category != ANSWER]
 
 
@@ -36,7 +36,7 @@ def answers_of(slave: Component) -> list[Fmi2Status]:
 
 
 class Variable(NamedTuple):
-    """What a host knows of a port; its type has functions of its own."""
+    """A port as a host sees it; its type has functions of its own."""
 
     reference: int
     type: str
@@ -49,7 +49,7 @@ def _variable(reference: int, fmi_type: str, causality: str) -> Variable:
 
 
 class Instance(ABC):
-    """What tests do with an instance, whatever runs it."""
+    """An instance as tests use it, in whichever way it runs."""
 
     def __init__(self, variables: Mapping[str, Variable]) -> None:
         self.variables = variables
@@ -75,7 +75,7 @@ class Instance(ABC):
         return self.read(variable.type, [variable.reference])[0]
 
     def references(self, causality: str) -> list[int]:
-        """Of the Real ports, in their order."""
+        """References of the Real ports, in their order."""
         return [
             variable.reference
             for variable in self.variables.values()

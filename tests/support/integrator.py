@@ -1,4 +1,4 @@
-"""A component as small as can be, dx/dt = gain a, seen as b, and the time."""
+"""A component of one equation, dx/dt = gain a, with the output b, and the time."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ FIXTURES = {PYTHON: "dist", NATIVE: "native"}
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a run has come to: a refusal before its first step, or an ending and rows."""
+    """Outcome of a run: a refusal before its first step, or an ending and rows."""
 
     refusal: str
     ending: Ending | None

@@ -28,7 +28,7 @@ from orchestrator.machine.compilers import SAME_NUMBERS
 #: As FMUs are compiled.
 FLAGS = ("-std=c99", *SAME_NUMBERS, "-fPIC", "-shared")
 
-#: What a test module begins with.
+#: First lines of a test module.
 HEAD = f"""\
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ from fmus.ports.port import Refusal
 #: Bytes of a message, as in text.c.
 _WHY = 2001
 
-#: What is said of an integer that C cannot hold.
+#: Error about an integer that C cannot hold.
 TOO_LARGE = "OverflowError: an integer exceeds 32 bits"
 
 _INCLUDES = """\
@@ -58,14 +58,14 @@ _INCLUDES = """\
 
 @dataclass(frozen=True)
 class Answer:
-    """What a function gives: numbers, or an error with its text."""
+    """Result of a function: numbers, or an error with its text."""
 
     numbers: tuple[float, ...] = ()
     error: str = ""
 
     @property
     def bits(self) -> tuple[str, ...]:
-        """The numbers by their bits, but for NaN, of which there is one."""
+        """The numbers by their bits, except that every NaN is the same."""
         return tuple("nan" if isnan(x) else float(x).hex() for x in self.numbers)
 
 
@@ -107,7 +107,7 @@ class Twins:
         self._library = CDLL(str(library))
 
     def python(self, name: str, numbers: Sequence[float]) -> Answer:
-        """What Python gives."""
+        """The answer in Python."""
         function = self.functions[name]
         hints = hints_of(function)
         hints.pop("return")
@@ -125,7 +125,7 @@ class Twins:
         return Answer(tuple(map(float, numbers)))
 
     def c(self, name: str, numbers: Sequence[float]) -> Answer:
-        """What C gives."""
+        """The answer in C."""
         function = self.functions[name]
         n = len(_leaves(type_of(hints_of(function)["return"]), ""))
         given, taken = (c_double * max(len(numbers), 1))(*numbers), (c_double * max(n, 1))()

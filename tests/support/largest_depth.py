@@ -1,4 +1,4 @@
-"""An index beside those of the bundle: how deep the centre of mass is."""
+"""An index that the bundle lacks: how deep the centre of mass is."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ class Inputs(NamedTuple):
 
 
 class State(NamedTuple):
-    """Of all rows so far."""
+    """Largest depth so far."""
 
     largest: float
 

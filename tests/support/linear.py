@@ -70,7 +70,7 @@ class Model(NamedTuple):
 SINE = Part(A=[[0.0, 1.0], [-1.0, 0.0]], C=np.eye(2), x=[0.0, 1.0])
 
 #: Two masses, and between them a spring and a damper that belong to the second, which is tied to a
-#: wall as well.
+#: wall, too.
 TWO_MASSES = Model(
     {
         "first": Part(A=[[0, 1], [-1, -0.1]], B=[[0, 0], [1, 0]], C=np.eye(2), x=[1.0, 0.0]),
@@ -184,7 +184,7 @@ def system_of(
 def exact(
     parts: Mapping[str, Part], wires: Mapping[str, str], times: np.ndarray
 ) -> dict[str, np.ndarray]:
-    """All outputs of the coupled system, whose inputs are at all times what feeds them.
+    """Outputs of the coupled system, whose inputs equal their sources at all times.
 
     x' = A x + B u, y = C x + D u, u = L y, so u = (1 - L D)^-1 L C x; by eigenvalues, or, where a
     matrix has too few eigenvectors, by its exponential series.

@@ -1,4 +1,4 @@
-"""What tests of the live page and of its parts share."""
+"""Helpers for tests of the live page and of its parts."""
 
 from __future__ import annotations
 
@@ -10,6 +10,6 @@ import pytest
 needs_npm = pytest.mark.skipif(which("npm") is None, reason="npm is not installed")
 needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
 
-#: What rows may differ by, relative to the larger of 1 and the value: C libraries differ in the
+#: Tolerance of rows, relative to the larger of 1 and the value: C libraries differ in the
 #: last bit of functions such as sine.
 TOLERANCE = 1e-9

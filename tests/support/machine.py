@@ -26,10 +26,10 @@ _CAP_DAC_OVERRIDE, _CAP_DAC_READ_SEARCH, _CAP_FOWNER, _CAP_SYS_RESOURCE = 1, 2, 
 #: The loops, each of which has to do as the other.
 LOOPS = ("python", "compiled")
 
-#: How long processes may take to notice that they are to end [s].
+#: Longest time for processes to notice that they must end [s].
 PATIENCE = 20.0
 
-#: What a crash can come before.
+#: Calls before which a crash can come.
 _CALLS = ("replace", "rename", "unlink", "rmdir", "mkdir", "fsync")
 
 
@@ -114,12 +114,12 @@ def members(session: int) -> set[int]:
 
 
 def is_over(session: int) -> bool:
-    """Whether all processes of a session end before patience does."""
+    """True if all processes of a session end before patience does."""
     return eventually(lambda: not members(session))
 
 
 def eventually(condition: Callable[[], object]) -> bool:
-    """Whether something comes true before patience ends."""
+    """True if something comes true before patience ends."""
     end = time.monotonic() + PATIENCE
     while time.monotonic() < end:
         if condition():
@@ -180,7 +180,7 @@ def killed_at(n: int, work: Callable[[], object], calls: Sequence[str] = _CALLS)
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """All files below a folder, hidden ones too, but for locks and ledgers, which all differ."""
+    """All files below a folder, also hidden ones, except locks and ledgers, which all differ."""
     return {
         path.relative_to(folder).as_posix(): path.read_bytes()
         for path in sorted(folder.rglob("*"))

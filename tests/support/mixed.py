@@ -22,7 +22,7 @@ from support.small_fmus import (
 
 _SOURCE = Path(__file__).with_name("mixed.c")
 
-#: Kinds of ports, of which a component has up to four inputs and four outputs each.
+#: Kinds of ports; a component has up to four inputs and four outputs of each.
 KINDS = ("Real", "Integer", "Enumeration", "Boolean")
 _MOST = 4
 
@@ -31,7 +31,7 @@ _PARAMETERS = {name: _PLACES[name.upper()] for name in ("at", "act", "call", "mi
 
 
 class Shape(NamedTuple):
-    """How many inputs and outputs of each kind an FMU has, and whether it claims feedthrough."""
+    """Number of inputs and outputs of each kind of an FMU, and its claim of feedthrough."""
 
     inputs: tuple[int, ...]
     outputs: tuple[int, ...]
@@ -133,7 +133,7 @@ _COUNTS = st.tuples(*[st.integers(0, _MOST)] * len(KINDS))
 
 @st.composite
 def systems(draw: st.DrawFn) -> dict[str, dict]:
-    """Arguments of :func:`system_of`: up to four components, of which one may misbehave."""
+    """Arguments of :func:`system_of`: up to four components; one may misbehave."""
     names = ["a", "b", "c", "d"][: draw(st.integers(1, 4))]
     # Feedthrough goes one way, so that it makes no loop.
     shapes = {

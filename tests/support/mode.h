@@ -1,4 +1,4 @@
-/* What slaves can do to the floating-point mode of all. */
+/* Ways for slaves to change the floating-point mode of the process. */
 
 #include <fenv.h>
 

@@ -1,4 +1,4 @@
-/* An FMI 2.0 slave as tools of others make them: see others.py.
+/* An FMI 2.0 slave as other tools make them: see others.py.
 
    y = gain u, plus the sum of its steps times 1 + u where it ends at a time, and every other output
    is the input of its kind. What is peculiar about it says how it is compiled. */
@@ -138,7 +138,7 @@ Status fmi2SetString(Component c, const unsigned *r, size_t n, const char *const
     return OK;
 }
 
-/* What is handed out is good until the next call. */
+/* The returned texts are good until the next call. */
 Status fmi2GetString(Component c, const unsigned *r, size_t n, const char **values)
 {
     Instance *it = c;

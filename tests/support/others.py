@@ -1,4 +1,4 @@
-"""FMUs as tools of others make them: one source in C, compiled with one peculiarity or another."""
+"""FMUs as other tools make them: one source in C, compiled with one peculiarity or another."""
 
 from __future__ import annotations
 

@@ -1,13 +1,24 @@
-"""A component of one file, and variants of its text."""
+"""A component of one file, variants of its text, and FMUs of such files."""
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from importlib import import_module
+from io import StringIO
 from pathlib import Path
 from types import ModuleType
+from unittest.mock import patch
 
+import fmpy
 import pytest
+
+from fmus.kinds import PYTHON
+from fmus.native.packaging import NativeKind
+from fmus.python.packaging import PythonKind, best_loader
+from fmus.script import source_of_script
+from orchestrator.machine.compilers import compiler_for, platforms
 
 LAG = '''\
 """A first-order lag, T dx/dt = u - x, solved exactly.
@@ -87,8 +98,37 @@ def write(folder: Path, *changes: tuple[str, str], name: str = "own_lag") -> Pat
 def imported(
     patch: pytest.MonkeyPatch, folder: Path, *changes: tuple[str, str], name: str = "own_lag"
 ) -> ModuleType:
-    """The module of the script, imported anew."""
+    """Import the module of the script again."""
     write(folder, *changes, name=name)
     patch.syspath_prepend(folder)
     patch.delitem(sys.modules, name, raising=False)
     return import_module(name)
+
+
+def called(main: Callable[[], int], folder: Path, *arguments: object) -> tuple[int, str, str]:
+    """Call a module's command line, and forget the modules that it imported from a folder.
+
+    Returns:
+        Exit status, output and errors.
+
+    """
+    out, errors = StringIO(), StringIO()
+    argv = ["main", *map(str, arguments)]
+    with patch.object(sys, "argv", argv), redirect_stdout(out), redirect_stderr(errors):
+        status = main()
+    for name, module in [*sys.modules.items()]:
+        if str(getattr(module, "__file__", None)).startswith(str(folder.resolve())):
+            del sys.modules[name]
+    return status, out.getvalue(), errors.getvalue()
+
+
+def built(script: Path, kind: str, folder: Path, fmi: str = "2") -> Path:
+    """Build the FMU of a script for this machine, and unpack it into a folder."""
+    fmu, source = folder.with_suffix(".fmu"), source_of_script(script)
+    _ = source.definition  # from now on the files that the script reads are known
+    if kind == PYTHON:
+        PythonKind(best_loader()).write(source, fmu)
+    else:
+        here = platforms(fmi, None)
+        NativeKind(fmi, here, compiler_for(here), lambda line: None).write(source, fmu)
+    return Path(fmpy.extract(str(fmu), folder))

@@ -18,7 +18,7 @@ _NONE = np.zeros(0)
 
 
 class Played(NamedTuple):
-    """What a run of a program has come to.
+    """Outcome of a run of a program.
 
     Attributes:
         rows: that were shown, time first.
@@ -48,7 +48,7 @@ def compiled(text: str, place: Path, *options: object) -> Path:
 
 
 def values_of(text: Text) -> list[float]:
-    """What a program begins with."""
+    """Start values of a program's parameters."""
     system, found = text.plan.system, []
     for name in text.parameters:
         value = system.value(name)

@@ -43,11 +43,11 @@ class Status(IntEnum):
 
 
 MODEL_EXCHANGE, CO_SIMULATION = range(2)
-#: Types that have functions of their own; enumerations have those of integers.
+#: Types that have functions of their own; enumerations are integers.
 TYPES = ("Real", "Integer", "Boolean", "String")
 TERMINATED_KIND, LAST_SUCCESSFUL_TIME_KIND = 3, 2
 
-#: What the functions take after the component: a pointer, a number of things, an int or a double.
+#: Arguments after the component: a pointer, a number of things, an int or a double.
 SIGNATURES = {
     "SetDebugLogging": "inp",
     "SetupExperiment": "iddid",
@@ -68,17 +68,11 @@ SIGNATURES = {
     **{f"Get{fmi_type}Status": "ip" for fmi_type in ("", *TYPES)},
 }
 OF_MODEL_EXCHANGE = {
-    "EnterEventMode": "",
-    "NewDiscreteStates": "p",
-    "EnterContinuousTimeMode": "",
-    "CompletedIntegratorStep": "ipp",
-    "SetTime": "d",
-    "SetContinuousStates": "pn",
-    "GetDerivatives": "pn",
-    "GetEventIndicators": "pn",
-    "GetContinuousStates": "pn",
+    "EnterEventMode": "", "NewDiscreteStates": "p", "EnterContinuousTimeMode": "",
+    "CompletedIntegratorStep": "ipp", "SetTime": "d", "SetContinuousStates": "pn",
+    "GetDerivatives": "pn", "GetEventIndicators": "pn", "GetContinuousStates": "pn",
     "GetNominalsOfContinuousStates": "pn",
-}
+}  # fmt: skip
 
 
 def harmless() -> dict[str, list[Any]]:
@@ -105,7 +99,7 @@ class Callbacks(Structure):
     )
 
 
-#: What every process has: calloc and free.
+#: calloc and free of this process.
 _LIBC = CDLL(None)
 
 #: Types of C for the types of FMI 2.0.
@@ -127,7 +121,7 @@ class Variable(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """What modelDescription.xml says. Read here: importing fmpy takes a second a process."""
+    """modelDescription.xml; importing fmpy would take a second in each process."""
 
     name: str
     guid: str
@@ -208,7 +202,7 @@ class Library:
 
     @property
     def answers(self) -> bool:
-        """Whether refusals are answered at the call: PythonFMU's own library cannot."""
+        """True if refusals are answered at the call: PythonFMU's own library cannot."""
         loaders = self.folder.glob("binaries/linux64/*_pythonfmu.so")
         return self.description.kind == NATIVE or any(loaders)
 
@@ -218,7 +212,7 @@ class Library:
 
 
 class Message(NamedTuple):
-    """What an FMU has logged."""
+    """A message of an FMU."""
 
     status: Status
     category: str
@@ -226,7 +220,7 @@ class Message(NamedTuple):
 
 
 class _Arrays:
-    """What a get call of the same variables needs, made once."""
+    """Arrays for repeated get calls of the same variables."""
 
     def __init__(self, fmi_type: str, variables: Sequence[Variable]) -> None:
         self.type = fmi_type
@@ -269,7 +263,7 @@ class Host:
         callbacks: str = "all",
         logging: bool = True,
     ) -> bool:
-        """Whether there is an instance; the defaults are a good call."""
+        """Make an instance; True if there is one. The defaults are a good call."""
         if guid == b"as declared":
             guid = self.description.guid.encode()
         if location == b"as unpacked":
@@ -340,7 +334,7 @@ class Host:
         return value
 
     def _read(self, arrays: _Arrays) -> list[Any]:
-        """Values of variables; None each, where there are no outputs since there is no start."""
+        """Values of variables; all None if there are no outputs for lack of a start."""
         status = self.call(f"fmi2Get{arrays.type}", arrays.references, arrays.n, arrays.values)
         if status == Status.Error:
             return [None] * len(arrays.names)
@@ -410,7 +404,7 @@ def instance(library: Library, **arguments: Any) -> Iterator[Host]:
 
 @contextmanager
 def initialised(library: Library, **arguments: Any) -> Iterator[Host]:
-    """An instance that can step, and has said nothing yet."""
+    """An instance that can step, without messages."""
     with instance(library, **arguments) as host:
         assert host.setup() == host.enter() == host.exit() == Status.OK
         host.messages.clear()

@@ -1,4 +1,4 @@
-"""An FMU in C that gives its input on, in proportion and integrated, and systems of it."""
+"""An FMU in C that passes its input on, in proportion and integrated, and systems of it."""
 
 from __future__ import annotations
 

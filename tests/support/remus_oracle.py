@@ -72,13 +72,13 @@ def _everywhere(vehicle: object, eta: Vector, nu: Vector, t: float) -> Vector:
 
 _DEMO = ("depthHeadingAutopilot", 30, 50, 1525, *CURRENT)
 
-#: Of the demonstrations, as they are.
+#: Manoeuvres of the simulator's demonstrations.
 DEMONSTRATIONS = {
     "step input": Manoeuvre((), lambda vehicle, eta, nu, t: vehicle.stepInput(t), 1, 120.0),
     "autopilot": Manoeuvre(_DEMO, _autopilot(1), 1, 200.0),
 }
 
-#: Of which there are tables: commands are rounded and held, so that a table can repeat them.
+#: Manoeuvres with tables: commands are rounded and held, so that a table can repeat them.
 TABLES = {
     "steps": Manoeuvre((), lambda vehicle, eta, nu, t: vehicle.stepInput(t), 50, 110.0),
     "autopilot": Manoeuvre(_DEMO, _autopilot(25), 25, 60.0),
@@ -87,7 +87,7 @@ TABLES = {
 
 
 def rows(manoeuvre: Manoeuvre) -> Iterator[Row]:
-    """What the simulator computes: its main loop, with each command held for some steps."""
+    """Run the simulator's main loop, with each command held for some steps."""
     gnc = import_module("python_vehicle_simulator.lib.gnc")
     vehicles = import_module("python_vehicle_simulator.vehicles.remus100")
     vehicle = vehicles.remus100(*manoeuvre.arguments)
@@ -107,7 +107,7 @@ def rows(manoeuvre: Manoeuvre) -> Iterator[Row]:
 
 
 def path(name: str) -> Path:
-    """Where a table is."""
+    """Path of a table."""
     return Path(__file__).parent / "remus100" / f"{name}.csv"
 
 
@@ -120,7 +120,7 @@ def table(name: str) -> list[Row]:
 
 
 def to_si(values: tuple[float, ...]) -> tuple[float, float, float]:
-    """A command, or what it comes to, with the speed of the propeller in rad/s."""
+    """A command, or an actuator's state, with the speed of the propeller in rad/s."""
     delta_r, delta_s, n = values
     return delta_r, delta_s, n * pi / 30.0
 

@@ -1,4 +1,4 @@
-"""FMUs in a host in C, without Python: each alone, with the inputs that it has in a run here."""
+"""FMUs in a host in C, without Python: each on its own, with its inputs in a run here."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 from orchestrator.cosim import Experiment, System, Table
 from orchestrator.machine.compilers import machines_compiler
 
-#: How the host calls the types of FMI.
+#: Letters of the host for the types of FMI.
 _LETTERS = {"Real": "R", "Integer": "I", "Enumeration": "I", "Boolean": "B"}
 
 SOURCE = Path(__file__).parents[1] / "fmu" / "replay.c"

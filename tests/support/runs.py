@@ -48,7 +48,7 @@ def companion(scenario: str) -> Prepared:
 
 
 class InThisProcess:
-    """What :class:`orchestrator.machine.workers.Workers` does, one after the other, and counted."""
+    """Tasks one after the other, and counted, instead of workers in processes."""
 
     def __init__(self) -> None:
         self.done: list[Any] = []

@@ -29,7 +29,7 @@ static double same_log(double x) {
     return y + n * LN_2;
 }
 
-/* Of no negative number. */
+/* Square root of a number that is at least zero. */
 static double same_pow(double x, double y) {
     return x > 0.0 ? same_exp(y * same_log(x)) : y > 0.0 ? 0.0 : 1.0;
 }

@@ -1,4 +1,4 @@
-"""What tests know of each component: from its ports and its behaviour, or from settings.toml."""
+"""Properties of each component for tests: from its ports and behaviour, or from settings.toml."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from fmus.discovery import components, source_of
-from fmus.ports.behaviour import Behaviour
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import Port
 from support.tiers import slow
@@ -26,15 +25,15 @@ def ports_of(name: str) -> Sequence[Port]:
 NAMES = [*components()]
 WITH_INPUTS = [n for n in NAMES if any(port.causality == "input" for port in ports_of(n))]
 
-#: One with noise and one without: between them they have ports of all types, states, and all that
-#: can go wrong. What every component has from the same base is tried on these, and on the others
-#: with `-m slow`.
+#: One with noise and one without: between them they have ports of all types, states, and every
+#: kind of refusal. Properties that all components have from the same base are tested on these, and
+#: on the others with `-m slow`.
 REPRESENTATIVES = ("AuvPlant", "ObserverController")
 EACH = [*REPRESENTATIVES, *slow(*(name for name in NAMES if name not in REPRESENTATIVES))]
 
 
 class Setting(NamedTuple):
-    """Values that a case needs, each of which is good, and values with which all is well again."""
+    """Values that a case needs, each good on its own, and values with which the run continues."""
 
     values: Mapping[str, float]
     good: Mapping[str, float]
@@ -43,30 +42,25 @@ class Setting(NamedTuple):
 
 
 class Trials(NamedTuple):
-    """How a component is tried.
+    """Values that a component is tried with.
 
     Attributes:
-        spread: how far good values may lie from those at the start [share].
-        overflow: values with which a state or an output of a step leaves the range of numbers.
-        no_start: values that no state and outputs at the start time follow from.
-        wild: values with which others need not fit together any more.
+        overflow: a state or an output of a step leaves the range of numbers.
+        no_start: no state and outputs at the start time follow from them.
 
     """
 
-    spread: float = 0.5
     overflow: Setting | None = None
     no_start: Setting | None = None
-    wild: Mapping[str, Any] = {}
 
 
 @cache
 def trials_of(name: str) -> Trials:
-    """How a component is tried; one not in settings.toml, and an FMU of others, as any may be."""
+    """Values for a component from settings.toml; none for a third-party FMU."""
     if name not in components():
         return Trials()
-    said: dict[str, Any] = tomllib.loads(SETTINGS.read_text()).get(name, {})
-    settings = {key: Setting(**said.pop(key)) for key in ("overflow", "no_start") if key in said}
-    return Trials(**said, **settings)
+    settings = tomllib.loads(SETTINGS.read_text()).get(name, {})
+    return Trials(**{key: Setting(**values) for key, values in settings.items()})
 
 
 @cache
@@ -76,9 +70,5 @@ def choices_of(name: str, port: str) -> Sequence[int]:
 
 
 def parameters_of(name: str) -> ParameterSet[Any]:
-    """What the parameters of a component mean to its equations."""
+    """The parameters of a component, as its equations take them."""
     return source_of(name).definition.parameters
-
-
-def behaviour_of(name: str) -> Behaviour:
-    return source_of(name).definition.behaviour

@@ -1,5 +1,5 @@
-/* What slaves of FMI 2.0 have in common that are written for tests: FMI's types. What a slave leaves
-   out is in defaults.c. */
+/* FMI's types, for slaves of FMI 2.0 that tests write. defaults.c has the functions
+   that a slave leaves out. */
 
 #include <stddef.h>
 #include <stdlib.h>
@@ -16,7 +16,7 @@ typedef struct {
     void *environment;
 } Callbacks;
 
-/* What is the same for all states that are one block of memory: its type is given. The FMU has
+/* State functions for a state that is one block of memory of the given type. The FMU has
    fmi2GetFMUstate and fmi2SetFMUstate of its own. */
 #define STATE_IS(type) \
     Status fmi2FreeFMUstate(Component c, void **state) \

@@ -15,7 +15,7 @@ from orchestrator.cosim.variables import StringTable
 from support.archives import fmu, variable
 from support.small_fmus import connected
 
-#: Where ports are in the row.
+#: Columns of the ports in the row.
 _PLACES = {name: place for place, name in enumerate(("u", "v", "y", "z"))}
 
 #: Outputs, y and z, of inputs, u and v.
@@ -45,10 +45,10 @@ class Static(SimpleNamespace):
         return {port: float(self._values[_PLACES[port]]) for port in ports}
 
     def enter_initialization(self, values: Mapping[str, Any], start_time: float = 0.0) -> None:
-        """Nothing is to be done."""
+        """Do nothing."""
 
     def exit_initialization(self) -> None:
-        """Nothing is to be done."""
+        """Do nothing."""
 
 
 def static_system(

@@ -18,17 +18,17 @@ MODES = ("instantiated", "initialising", "stepping", "terminated")
 ERROR = "error"
 STATES = (*MODES, ERROR)
 
-#: Rows that are about no instance: the function that makes one, and what stands in its place.
+#: Rows without an instance: the function that makes one, and other pointers.
 CREATION, WITHOUT_AN_INSTANCE = "fmi2Instantiate", "no instance"
 
-#: What stands for a name with fmi3 in it.
+#: Entry of a function whose name has only another number.
 SAME_NAME = "the same"
 
 _UNSOUND = ("NULL", "n = ", "not UTF-8", "freed", "pointer", "too few", "too many")
 
 
 class Answer(NamedTuple):
-    """What becomes of a call: a line of the table of answers."""
+    """An answer: a line of the table of answers."""
 
     name: str
     status: str
@@ -43,7 +43,7 @@ class Answer(NamedTuple):
 
     @property
     def fails(self) -> bool:
-        """Whether it leads to the state error."""
+        """True if it leads to the state error."""
         return self.afterwards.startswith(self.status) and self.status == "fmi2Error"
 
     @property
@@ -52,7 +52,7 @@ class Answer(NamedTuple):
 
 
 class Cell(NamedTuple):
-    """What a call is answered with in a state, and the state that it leads to."""
+    """The answer to a call in a state, and the state that it leads to."""
 
     answer: Answer
     leads_to: str
@@ -71,7 +71,7 @@ class Row(NamedTuple):
 
     @property
     def is_unsound(self) -> bool:
-        """Whether its arguments are such that only the loader looks at them."""
+        """True if only the loader sees its arguments."""
         return any(word in self.case for word in _UNSOUND)
 
     def __str__(self) -> str:
@@ -117,7 +117,7 @@ def _cell(text: str, state: str) -> Cell:
 
 
 def creations(kind: str = PYTHON) -> dict[str, bool]:
-    """Whether fmi2Instantiate gives an instance, by what it is called with."""
+    """True if fmi2Instantiate gives an instance, by its arguments."""
     found = _creations("Creating an instance")
     if kind == NATIVE:
         others = _creations("The FMUs in C")
@@ -132,7 +132,7 @@ def _creations(heading: str) -> dict[str, bool]:
 
 
 def without_an_instance() -> dict[str, str]:
-    """The status of any call, by what stands in the place of an instance."""
+    """The status of any call, by the pointer that replaces an instance."""
     rows = _sections()["No instance"].rows
     return {what: answer for places, answer in rows for what in places.split("; ")}
 
@@ -154,6 +154,6 @@ def names_in_fmi3() -> dict[str, str]:
 
 @cache
 def fmi3_rows() -> dict[tuple[str, str], str]:
-    """What only FMI 3.0 has: the answers, by function and case."""
+    """The answers of functions of FMI 3.0 only, by function and case."""
     _, own = _tables_of_fmi3()
     return {key: answer for functions, cases, answer in own.rows for key in _keys(functions, cases)}

@@ -1,4 +1,4 @@
-"""What the property-based tests draw from."""
+"""Strategies of the property-based tests."""
 
 from __future__ import annotations
 

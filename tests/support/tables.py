@@ -13,14 +13,9 @@ from orchestrator.cosim import Experiment, Header, Order, PortName, Table
 from orchestrator.vehicle.signals import STANDARD, Loop
 
 COLUMNS = (
-    *STANDARD.posture,
-    *STANDARD.nu,
-    *STANDARD.dy,
-    *STANDARD.commanded,
-    *STANDARD.y_d,
-    *STANDARD.dy_hat,
-    *STANDARD.theta_hat,
-)
+    *STANDARD.posture, *STANDARD.nu, *STANDARD.dy, *STANDARD.commanded, *STANDARD.y_d,
+    *STANDARD.dy_hat, *STANDARD.theta_hat,
+)  # fmt: skip
 STEP = 0.02
 UNITS = {
     f"{group}.{member}": unit
@@ -49,7 +44,7 @@ def loop_table(
 
 
 def at_its_time(table: Table, acting: Collection[str]) -> Table:
-    """The same run with what acts in a step in the row of its beginning.
+    """The same run, with the values that act in a step in the row of its beginning.
 
     The last row then holds what never acts: here it is no number.
     """
@@ -88,7 +83,7 @@ def fleet_table(n: int, rows: int = 400, without: Collection[str] = ()) -> Table
 def table_of(
     time: np.ndarray, parameters: Mapping[PortName, Any] | None = None, **columns: Any
 ) -> Table:
-    """A table of given columns, `a__b` for `a.b`; a number stands in all rows."""
+    """A table of given columns, `a__b` for `a.b`; a number is the value of all rows."""
     names = tuple(name.replace("__", ".") for name in columns)
     values = [np.broadcast_to(value, len(time)) for value in columns.values()]
     header = Header(names, Experiment(float(time[-1]), float(time[1])), parameters or {})

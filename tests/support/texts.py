@@ -1,4 +1,4 @@
-"""What matters in a text: its numbers, and the names in it. How it is worded is not tested."""
+"""Numbers and names in a text, whose other words are not tested."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def numbers_in(text: str) -> list[float]:
 
 
 def tells(text: str, *runs: Sequence[float | str]) -> bool:
-    """Whether a text has runs of numbers, each without another number between.
+    """True if a text has runs of numbers, each without another number between.
 
     Args:
         text: in any words.
@@ -30,5 +30,5 @@ def tells(text: str, *runs: Sequence[float | str]) -> bool:
 
 
 def mentions(text: str, culprits: str) -> bool:
-    """Whether a text has some words with a blank between them, wherever they stand in it."""
+    """True if a text has some words, with a blank between them, anywhere."""
     return all(word in text for word in culprits.split())

@@ -1,4 +1,4 @@
-"""Which cases of a test wait for `pytest -m slow`."""
+"""Cases of tests that wait for `pytest -m slow`."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class Toy(NamedTuple):
 
 
 def outcome(point: Point, process: int = 0) -> Outcome:
-    """What a run comes to."""
+    """Outcome of a run."""
     return Outcome(point.number, {"square": point.parameters["toy.x"] ** 2, "process": process})
 
 
@@ -43,10 +43,10 @@ def run(number: int, parameters: Mapping[str, Any] = {}) -> Point:
 
 
 def numbers_and_squares(blocks: Iterable[Sequence[Outcome]]) -> list[tuple[int, Any]]:
-    """What has come of runs, in their order."""
+    """Outcomes of runs, in their order."""
     return sorted((made.number, made.indices.get("square")) for block in blocks for made in block)
 
 
 def expected(points: Iterable[Point]) -> list[tuple[int, Any]]:
-    """What is to come of them."""
+    """Expected outcomes."""
     return [(point.number, outcome(point).indices["square"]) for point in points]

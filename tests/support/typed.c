@@ -1,7 +1,8 @@
 /* An FMI 3.0 slave with ports of every type: see typed.py.
 
    Every output is the input of its type at the same time, w = gain (M v) + x and x' = u, and counter
-   adds one in every step. Compiled with LACKS, it has only what a run without events needs. */
+   adds one in every step. Compiled with LACKS, it has only the functions
+   that a run without events needs. */
 
 /* Functions that do nothing are declared without arguments. */
 #define fmi3Functions_h
@@ -31,7 +32,7 @@ typedef struct {
     fmi3InstanceEnvironment environment;
 } Instance;
 
-/* Where the values of each value reference are, and how many there are. */
+/* Place and number of the values of each value reference. */
 static const struct {
     size_t at, n;
 } places[] = {
@@ -233,7 +234,7 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_
     return fmi3OK;
 }
 
-/* Of w after v, of y after u; nothing else depends on anything. */
+/* Derivatives of w by v and of y by u; there are no others. */
 fmi3Status fmi3GetDirectionalDerivative(fmi3Instance c, const fmi3ValueReference unknowns[],
                                         size_t n_unknowns, const fmi3ValueReference knowns[],
                                         size_t n_knowns, const fmi3Float64 seed[], size_t n_seed,

@@ -21,20 +21,10 @@ SCALARS = (
 
 #: Values for these that the next larger or smaller type could not hold, or a double.
 VALUES: Mapping[str, Value] = {
-    "Float64": 0.1,
-    "Float32": -(2.0**-149),
-    "Int8": -128,
-    "UInt8": 255,
-    "Int16": -(2**15),
-    "UInt16": 2**16 - 1,
-    "Int32": -(2**31),
-    "UInt32": 2**32 - 1,
-    "Int64": -(2**63) + 1,
-    "UInt64": 2**64 - 1,
-    "Enumeration": 4,
-    "Boolean": True,
-    "String": "ä b",
-}
+    "Float64": 0.1, "Float32": -(2.0**-149), "Int8": -128, "UInt8": 255, "Int16": -(2**15),
+    "UInt16": 2**16 - 1, "Int32": -(2**31), "UInt32": 2**32 - 1, "Int64": -(2**63) + 1,
+    "UInt64": 2**64 - 1, "Enumeration": 4, "Boolean": True, "String": "ä b",
+}  # fmt: skip
 
 #: Value references of the others.
 (TIME, X, END_AT, EARLY_AT, GAIN, M, V, W, STEPS, N, COUNTER, COUNTS_FROM, COMPLAINS, NAMES, JOINED,

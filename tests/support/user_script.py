@@ -28,7 +28,7 @@ def accepted(folder: Path) -> None:
 
 
 def refused(result: Result) -> None:
-    """Names that there are not."""
+    """Names that do not exist."""
     load("fig4", "nativ")  # type: ignore[arg-type]
     load("fig4", fmi="1")  # type: ignore[arg-type]
     simulate("fig4", kind="nativ")  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Small components whose hooks take what is asked for."""
+"""Small components whose hooks take given arguments."""
 
 from __future__ import annotations
 
@@ -9,15 +9,11 @@ from typing import NamedTuple
 
 _NUMBER = count()
 
-#: What each argument adds to what a hook returns.
+#: Term of each argument in the result of a hook.
 _PARTS = {
-    "parameters": "0.3 * parameters.p",
-    "state": "0.7 * state.x",
-    "derived": "0.9 * derived",
-    "inputs": "0.2 * inputs.u",
-    "t": "0.01 * t",
-    "h": "h",
-}
+    "parameters": "0.3 * parameters.p", "state": "0.7 * state.x", "derived": "0.9 * derived",
+    "inputs": "0.2 * inputs.u", "t": "0.01 * t", "h": "h",
+}  # fmt: skip
 
 _TEXT = """
 from typing import Annotated, NamedTuple
@@ -79,7 +75,7 @@ _TYPES = {name: name.capitalize() for name in ("parameters", "state", "inputs")}
 
 
 class Hooks(NamedTuple):
-    """What the hooks of a component take, and which there are."""
+    """The hooks of a component, with their arguments."""
 
     outputs: tuple[str, ...]
     derive: tuple[str, ...] | None  #: None: there is none

@@ -23,27 +23,13 @@ from auv_fmu.water.waves import Spectrum
 
 TEN, ZERO_3, ZERO_4, ZERO_5, ZERO_6 = (10.0,) * 3, *((0.0,) * n for n in (3, 4, 5, 6))
 CONTROLLER = {
-    "K1": TEN,
-    "lambda_": 1.0,
-    "gamma": 1.0,
-    "sigma": 0.001,
-    "theta_0": ZERO_4,
-    "eps_t": 1.0,
+    "K1": TEN, "lambda_": 1.0, "gamma": 1.0, "sigma": 0.001, "theta_0": ZERO_4, "eps_t": 1.0,
     "ell": 0.35,
-}
+}  # fmt: skip
 SECTION_4_1 = {
     "Vehicle": {
-        "m11": 25.0,
-        "m22": 17.5,
-        "m33": 30.0,
-        "m55": 22.5,
-        "m66": 15.0,
-        "d11": 30.0,
-        "d22": 30.0,
-        "d33": 30.0,
-        "d55": 20.0,
-        "d66": 20.0,
-        "righting_pitch": 5.0,
+        "m11": 25.0, "m22": 17.5, "m33": 30.0, "m55": 22.5, "m66": 15.0, "d11": 30.0, "d22": 30.0,
+        "d33": 30.0, "d55": 20.0, "d66": 20.0, "righting_pitch": 5.0,
     },
     "RollAxis": {"m44": 22.5, "d44": 20.0},
     "Limits": {"tau_min": (-80.0,) * 3, "tau_max": (80.0,) * 3},
@@ -51,20 +37,16 @@ SECTION_4_1 = {
     "Gains": {**CONTROLLER, "K2": TEN, "k_d": 50.0, "s": Saturation.TANH},
     "PdGains": CONTROLLER,
     "plant.Parameters": {
-        "ell": 0.35,
-        "eta0": (2.0, 6.0, 0.0, 0.0, 0.0, 0.0),
-        "integrator": plant.EULER,
+        "ell": 0.35, "eta0": (2.0, 6.0, 0.0, 0.0, 0.0, 0.0), "integrator": plant.EULER,
     },
     "motion_planner.Parameters": {
-        "ell": 0.35,
-        "tau_d": (5.0, 1.0, 2.0),
-        "eta0": (0.0, 0.0, -2.0, 0.0, 0.0),
+        "ell": 0.35, "tau_d": (5.0, 1.0, 2.0), "eta0": (0.0, 0.0, -2.0, 0.0, 0.0),
     },
     "path_planner.Parameters": {"ell": 0.35},
     "formation.Parameters": {"ell": 0.35},
     "LongestSteps": dict.fromkeys(("plant", "controller", "planner"), 0.02),
     "Setting": {"h": 0.02},
-}
+}  # fmt: skip
 OURS = {
     "RollAxis": {"righting_roll": 5.0, "rolls": True},
     "Localisation": {"std": 0.001, "seed": 1},
@@ -84,57 +66,27 @@ OURS = {
     },
     "path_planner.Parameters": {"speed_max": 2.5, "turn_max": 4.0},
     "Waves": {
-        "spectrum": Spectrum.JONSWAP,
-        "Hs": 1.0,
-        "Tp": 7.0,
-        "gamma": 3.3,
-        "highest": 4.0,
-        "direction": 0.0,
-        "s": 10.0,
-        "n": 32,
-        "seed": 1,
+        "spectrum": Spectrum.JONSWAP, "Hs": 1.0, "Tp": 7.0, "gamma": 3.3, "highest": 4.0,
+        "direction": 0.0, "s": 10.0, "n": 32, "seed": 1,
     },
-    "Current": {
-        "speed": 0.1,
-        "direction": 0.0,
-        "root": 7.0,
-        "mu": 0.005,
-        "sigma": 0.02,
-        "seed": 1,
-    },
+    "Current": {"speed": 0.1, "direction": 0.0, "root": 7.0, "mu": 0.005, "sigma": 0.02, "seed": 1},
     "Sea": {"depth": 50.0, "g": 9.81},
     "Stages": {
-        "n": 1,
-        "shape": (formation.LINE,) * 4,
-        "spacing": (5.0,) * 4,
-        "x": ZERO_4,
-        "y": ZERO_4,
-        "z": ZERO_4,
-        "t": (30.0, 60.0, 90.0),
-        "duration": (20.0,) * 3,
+        "n": 1, "shape": (formation.LINE,) * 4, "spacing": (5.0,) * 4, "x": ZERO_4, "y": ZERO_4,
+        "z": ZERO_4, "t": (30.0, 60.0, 90.0), "duration": (20.0,) * 3,
     },
     "Estimator": {"lambda_": 0.5, "k_d": 0.5, "age_max": 4.0, "z_max": 2.0},
     "formation.Parameters": {
-        "number": 2,
-        "vehicles": 3,
-        "omega_chi": 0.3,
-        "turn_chi": 0.2,
-        "estimated": False,
-        "speed_max": 2.5,
-        "turn_max": 4.0,
+        "number": 2, "vehicles": 3, "omega_chi": 0.3, "turn_chi": 0.2, "estimated": False,
+        "speed_max": 2.5, "turn_max": 4.0,
     },
     "acoustic_link.Parameters": {
-        "period": 1.0,
-        "sound_speed": 1500.0,
-        "latency": 0.2,
-        "loss": 0.0,
-        "seed": 1,
-        "outage_start": 0.0,
-        "outage_duration": 0.0,
+        "period": 1.0, "sound_speed": 1500.0, "latency": 0.2, "loss": 0.0, "seed": 1,
+        "outage_start": 0.0, "outage_duration": 0.0,
     },
-}
+}  # fmt: skip
 
-#: Those of PythonVehicleSimulator 1.0.1, and what it does not have.
+#: Defaults of PythonVehicleSimulator 1.0.1, and of parameters that it lacks.
 REMUS_100 = {
     "Hull": {
         "length": 1.6,
@@ -209,11 +161,7 @@ def test_defaults_are_the_papers_or_named_as_ours(name):
         for field, value in SETS[name]._field_defaults.items()
         if name_of(type(value)) not in SETS
     }
-    assert plain == {
-        **SECTION_4_1.get(name, {}),
-        **OURS.get(name, {}),
-        **REMUS_100.get(name, {}),
-    }
+    assert plain == {**SECTION_4_1.get(name, {}), **OURS.get(name, {}), **REMUS_100.get(name, {})}
 
 
 def nested(value):
@@ -240,7 +188,7 @@ def test_sets_within_the_setting_of_the_loop_are_those_with_all_defaults():
     assert all(value == type(value)() for value in (*blocks, *inner))
 
 
-def test_constants_are_those_of_section_4_1():
+def test_constants_are_the_ones_of_section_4_1():
     assert (control_point.ELL, euler.STEP) == (0.35, 0.02)
 
 
@@ -254,7 +202,7 @@ def test_the_face_is_the_orchestrators():
     assert not hasattr(auv_fmu, "nothing")
 
 
-def test_nothing_of_the_face_is_imported_before_it_is_used():
+def test_the_face_is_imported_when_it_is_used():
     code = "import sys, auv_fmu; assert auv_fmu.__version__; sys.exit(bool({}))"
     heavy = "{'numpy', 'orchestrator', 'fmus', 'fmpy'} & sys.modules.keys()"
     subprocess.run([sys.executable, "-c", code.format(heavy)], check=True)

@@ -9,7 +9,7 @@ from auv_fmu import POSITIVE, Variable, __author__, __license__, __version__
 
 
 class Parameters(NamedTuple):
-    """What may be set; what is tunable also during a run."""
+    """Parameters; a tunable one also changes during a run."""
 
     T: Annotated[float, Variable("s", "Time constant", minimum=POSITIVE, tunable=True)] = 0.5
     x0: Annotated[float, Variable("m", "Value at the start")] = 1.0
@@ -18,19 +18,19 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What it follows."""
+    """Inputs."""
 
     u: Annotated[float, Variable("m", "Set point")] = 0.0
 
 
 class State(NamedTuple):
-    """What it remembers from step to step."""
+    """State between steps."""
 
     x: float  #: [m]
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs."""
 
     x: Annotated[float, Variable("m", "Value")]
     y: Annotated[float, Variable("m", "Value, measured")]
@@ -47,7 +47,7 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 
 
 def outputs(state: State) -> Outputs:
-    """What is seen of a state, without noise."""
+    """Outputs of a state, without noise."""
     return Outputs(x=state.x, y=state.x)
 
 

@@ -38,7 +38,7 @@ _DESCRIBE = {"2": fmi2_description, "3": fmi3_description}
 
 
 def definition(variant: str = "read") -> Definition:
-    """What it is."""
+    """Definition of a variant of the component."""
     return define(NAME, VARIANTS[variant])
 
 

@@ -1,7 +1,7 @@
 """Ports, parameters and state of all types.
 
-Every step moves all that it has, and overflows or fails where it is told. Its outputs follow the
-inputs and the time.
+Every step changes every part of the state, and some inputs make it overflow or fail. Its outputs
+follow the inputs and the time.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from auv_fmu import Matrix, Refusal, Variable, Vector
 
 
 class Mode(IntEnum):
-    """What it does."""
+    """Modes."""
 
     OFF = 0
     HEAT = 2
@@ -36,7 +36,7 @@ class Mixed(NamedTuple):
 
 
 class Parameters(NamedTuple):
-    """What may be set."""
+    """Parameters."""
 
     gain: Annotated[float, Variable("1", "Gain", tunable=True)] = 0.5
     K: Annotated[Matrix, 2, 2, Variable("1", "Matrix")] = Matrix(((1.0, 0.5), (-0.5, 2.0)))
@@ -49,7 +49,7 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What it follows."""
+    """Inputs."""
 
     k: Annotated[int, Variable(minimum=-5, maximum=2_147_483_647)] = 3
     u: Annotated[float, Variable("1", "Value")] = 0.25
@@ -70,7 +70,7 @@ class Inner(NamedTuple):
 
 
 class State(NamedTuple):
-    """What a step depends on."""
+    """State."""
 
     n: int
     x: float
@@ -84,7 +84,7 @@ class State(NamedTuple):
 
 
 class Derived(NamedTuple):
-    """What follows from the state and the inputs."""
+    """Values that follow from the state and the inputs."""
 
     place: int
     double: Annotated[Vector, 4]
@@ -92,7 +92,7 @@ class Derived(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    """What is seen of it."""
+    """Outputs."""
 
     n: Annotated[int, Variable()]
     x: Annotated[float, Variable()]
@@ -110,13 +110,13 @@ H_MAX = 0.02
 
 
 def check(parameters: Parameters) -> None:
-    """Whether parameters fit together."""
+    """Refuse parameters that do not fit together."""
     if parameters.step > parameters.limits.most:
         raise Refusal(f"step = {parameters.step}: must be at most {parameters.limits.most}")
 
 
 def check_state(state: State) -> None:
-    """Whether a run can have led to a state."""
+    """Refuse a state that no run leads to."""
     if state.inner.count < 0:
         raise Refusal(f"count = {state.inner.count}")
 
@@ -139,13 +139,13 @@ def start(parameters: Parameters, inputs: Inputs, t: float) -> State:
 
 
 def derive(parameters: Parameters, state: State, inputs: Inputs, t: float) -> Derived:
-    """What follows from the state and the inputs."""
+    """Values that follow from the state and the inputs."""
     double = (1.5 + parameters.gain + t * inputs.v[0]) * state.line
     return Derived((state.n % 4 + inputs.k % 4) % 4, double, state.mode == Mode.OFF)
 
 
 def credible(state: State) -> bool:
-    """Whether x is not wild."""
+    """True if x is not wild."""
     return abs(state.x) < 1e6
 
 
@@ -190,7 +190,7 @@ def update(
 def outputs(
     parameters: Parameters, state: State, derived: Derived, inputs: Inputs, t: float
 ) -> Outputs:
-    """What is seen of it."""
+    """Outputs."""
     return Outputs(
         n=state.n,
         x=state.x + t * (inputs.u - 0.25) / parameters.limits.default,
@@ -205,7 +205,7 @@ def outputs(
 
 
 def seed(parameters: Parameters) -> int:
-    """Of the noise."""
+    """Seed of the noise."""
     if parameters.step == 13:
         raise Refusal("step = 13: no seed")
     return parameters.step

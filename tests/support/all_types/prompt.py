@@ -12,7 +12,7 @@ def restarted(state: State) -> State:
 
 
 def outputs(parameters: Parameters, state: State, t: float) -> Outputs:
-    """What is seen of it."""
+    """Outputs."""
     return Outputs(
         n=state.n,
         x=state.x + t,

@@ -1,4 +1,4 @@
-"""What FMUs are built from, and what of it is in them."""
+"""Sources of FMUs, and contents of FMUs."""
 
 from __future__ import annotations
 
@@ -21,9 +21,7 @@ def test_every_source_is_part_of_the_fingerprint(tmp_path: Path, monkeypatch: py
         [folder] = package.__path__
         folders[package.__name__] = tmp_path / package.__name__
         shutil.copytree(
-            folder,
-            folders[package.__name__],
-            ignore=shutil.ignore_patterns("dist", "__pycache__"),
+            folder, folders[package.__name__], ignore=shutil.ignore_patterns("dist", "__pycache__")
         )
     monkeypatch.setattr(discovery, "package_folder", folders.__getitem__)
     fingerprints = {discovery.fingerprint(NATIVE)}

@@ -1,4 +1,4 @@
-"""All that is wrong with a component is listed at once, by file and line."""
+"""All mistakes of a component are listed at once, by file and line."""
 
 from __future__ import annotations
 
@@ -13,22 +13,28 @@ import pytest
 from fmus import check
 from fmus.native import packaging
 from orchestrator.machine.compilers import machines_compiler
-from support.own import write
+from support.own import called, write
 
 
-def mistakes(*arguments: object) -> tuple[int, list[str]]:
-    process = subprocess.run(
-        [sys.executable, "-P", "-m", "fmus.check", *map(str, arguments)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    return process.returncode, (process.stdout + process.stderr).splitlines()
+@pytest.fixture
+def mistakes(tmp_path, monkeypatch):
+    """The exit status of `fmus.check` in a folder, and its lines."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("own_lag", "beside"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+
+    def checked(*arguments: object) -> tuple[int, list[str]]:
+        status, out, errors = called(check.main, tmp_path, *arguments)
+        return status, (out + errors).splitlines()
+
+    return checked
 
 
-def test_of_a_good_component_nothing_is_said(tmp_path):
+def test_of_a_good_component_nothing_is_said(tmp_path, mistakes):
     assert mistakes(write(tmp_path)) == (0, [])
 
 
-def test_everything_is_listed_in_the_order_of_the_lines(tmp_path, monkeypatch):
+def test_everything_is_listed_in_the_order_of_the_lines(tmp_path, mistakes):
     write(
         tmp_path,
         ("return State(state.x -", "y = [1.0, 2.0]\n    return State(state.x ** 0.5 -"),
@@ -39,7 +45,6 @@ def test_everything_is_listed_in_the_order_of_the_lines(tmp_path, monkeypatch):
     (tmp_path / "beside.py").write_text(
         "from math import expm1\n\n\ndef half(x: float) -> float:\n    return sum((x, x)) / 4.0\n"
     )
-    monkeypatch.chdir(tmp_path)
     status, lines = mistakes("own_lag.py")
     assert status == 0
     assert [line.partition(" is ")[0] for line in lines] == [
@@ -50,39 +55,35 @@ def test_everything_is_listed_in_the_order_of_the_lines(tmp_path, monkeypatch):
     ]
 
 
-def test_what_only_the_translation_finds_is_told(tmp_path, monkeypatch):
+def test_what_only_the_translation_finds_is_told(tmp_path, mistakes):
     write(tmp_path, ("return Outputs(state.x)", "return Outputs(1)"))
-    monkeypatch.chdir(tmp_path)
     status, [line] = mistakes("own_lag.py")
     assert status == 0
     assert line.startswith("own_lag.py:60: ")
 
 
-def test_numbers_too_many_for_the_stack_are_told(tmp_path, monkeypatch):
+def test_numbers_too_many_for_the_stack_are_told(tmp_path, mistakes):
     many = "Vector(k * x for k in range(65_536))"
     write(
         tmp_path,
         ("import POSITIVE, Refusal, Variable", "import POSITIVE, Refusal, Variable, Vector"),
         ("return Outputs(state.x)", f"x = state.x\n    return Outputs(({many} + {many}).sum())"),
     )
-    monkeypatch.chdir(tmp_path)
     lines = mistakes("own_lag.py")[1]
     assert any(
         "C takes at most 49152, since they are on a thread's stack" in line for line in lines
     )
 
 
-def test_an_expression_that_is_too_long_is_told(tmp_path, monkeypatch):
+def test_an_expression_that_is_too_long_is_told(tmp_path, mistakes):
     write(tmp_path, ("return Outputs(state.x)", f"return Outputs({'state.x + ' * 3000}state.x)"))
-    monkeypatch.chdir(tmp_path)
     assert "own_lag.py: an expression is too long: take it apart" in mistakes("own_lag.py")[1]
 
 
-def test_a_module_that_cannot_be_imported_is_told(tmp_path, monkeypatch):
+def test_a_module_that_cannot_be_imported_is_told(tmp_path, mistakes):
     write(tmp_path, ("from math import expm1", "import nothing_there\nfrom math import expm1"))
-    monkeypatch.chdir(tmp_path)
     assert [line.split(";")[0] for line in mistakes("own_lag.py")[1]] == [
-        "own_lag.py:8: ModuleNotFoundError: No module named 'nothing_there'",
+        "own_lag.py:8: ModuleNotFoundError: No module named 'nothing_there'"
     ]
 
 
@@ -116,9 +117,8 @@ def outputs(state: Inputs, h: float) -> Outputs:
 
 
 @pytest.mark.parametrize("option", [(), ("--index",)])
-def test_an_index_is_checked_as_such(tmp_path, monkeypatch, option):
+def test_an_index_is_checked_as_such(tmp_path, option, mistakes):
     (tmp_path / "own_index.py").write_text(INDEX)
-    monkeypatch.chdir(tmp_path)
     status, lines = mistakes("own_index.py", *option)
     assert status == 0
     assert [line.partition(";")[0] for line in lines] == [
@@ -127,7 +127,7 @@ def test_an_index_is_checked_as_such(tmp_path, monkeypatch, option):
     ]
 
 
-def test_what_is_no_component_is_refused(tmp_path):
+def test_other_modules_than_components_are_refused(tmp_path, mistakes):
     path = tmp_path / "own.py"
     path.write_text("x = 1\n")
     assert mistakes(path) == (
@@ -149,21 +149,20 @@ def test_what_the_compiler_says_of_the_translation_is_told(tmp_path, monkeypatch
     assert line.startswith("own_c.py: ") and "ports.h:1" in line
 
 
-def test_what_a_hook_says_wrong_is_told_with_the_line_of_the_argument(tmp_path, monkeypatch):
+def test_what_a_hook_says_wrong_is_told_with_the_line_of_the_argument(tmp_path, mistakes):
     write(tmp_path, ("inputs: Inputs, h: float", "inputs: Inputs,\n    h: int"))
-    monkeypatch.chdir(tmp_path)
     why = "own_lag.py:54: own_lag.update takes h as int; write float"
     assert mistakes("own_lag.py") == (0, [why])
 
 
-def test_what_the_component_prints_is_no_mistake(tmp_path):
+def test_printed_lines_are_not_counted_as_mistakes(tmp_path, mistakes):
     path = write(tmp_path, ('__author__ = "Me"', '__author__ = print("Hello") or "Me"'))
     assert mistakes(path) == (0, ["Hello"])
 
 
 @pytest.mark.parametrize("module", ["check", "build"])
 def test_byte_code_beside_a_component_is_neither_believed_nor_written(tmp_path, module):
-    """Python would take this byte code for that of the text, whatever the text says."""
+    """Python would run this byte code instead of the text."""
     write(tmp_path, ("from math import expm1", "from beside import expm1"))
     (tmp_path / "beside.py").write_text("from math import expm1\n")
     (tmp_path / "other.py").write_text("raise SystemExit('other code')\n")

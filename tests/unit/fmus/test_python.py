@@ -1,4 +1,4 @@
-"""Whatever hooks take, a run is as if all was computed anew each time that it is needed."""
+"""Whatever hooks take, a run is as if everything was computed each time that it is needed."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ U, Y, Z, P = 0, 1, 2, 3
 
 
 def ask(module: ModuleType, hook: str, known: dict[str, Any]) -> Any:
-    """What a hook returns, of the arguments that it takes."""
+    """Call a hook with the arguments that it takes."""
     function = getattr(module, hook)
     return function(**{name: known[name] for name in signature(function).parameters})
 
 
 class Plain:
-    """The same run, written down from what docs say of hooks: nothing is remembered."""
+    """The same run, from the documentation of the hooks: no value is kept."""
 
     def __init__(self, module: ModuleType, hooks: Hooks, start: float) -> None:
         self.module, self.hooks, self.start = module, hooks, start
@@ -37,7 +37,7 @@ class Plain:
         self.n = self.random.gauss(0.0, 1.0)
         self.x = ask(module, "start", self.known(None, start))
         self.shown = self.evaluated(self.x, self.n, start)
-        #: Whether the output is what is shown, and whether it is that of the state.
+        #: True if the output is the shown one, and if it belongs to the present state.
         self.is_held = self.is_of_now = True
 
     def known(self, state: Any, t: float, **more: Any) -> dict[str, Any]:
@@ -61,7 +61,7 @@ class Plain:
         return y + 0.1 * self.p * n if self.hooks.has_noise else y
 
     def depends(self, on: str) -> bool:
-        """Whether outputs depend on something, as their arguments say."""
+        """True if outputs depend on something, as their arguments show."""
         taken = {*self.hooks.outputs}
         if "derived" in taken:
             taken |= {*(self.hooks.derive or ())}

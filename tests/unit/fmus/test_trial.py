@@ -39,7 +39,7 @@ def test_inputs_are_held_or_follow_the_time(lag):
     assert late["x"][3] == held["x"][1]
 
 
-def test_outputs_are_those_of_the_inputs_of_their_time(lag):
+def test_outputs_follow_the_inputs_of_their_time(lag):
     own = lag(
         ("def outputs(state: State)", "def outputs(state: State, inputs: Inputs, t: float)"),
         ("return Outputs(state.x)", "return Outputs(inputs.u + 100.0 * t + 0.0 * state.x)"),
@@ -73,7 +73,7 @@ def test_a_vector_is_set_whole_or_by_its_elements(lag, given):
         ({"x0": 101.0}, {}, "x0 is too far away"),
     ],
 )
-def test_what_is_refused_is_raised(lag, parameters, inputs, why):
+def test_refusals_are_raised(lag, parameters, inputs, why):
     with pytest.raises(Refusal, match=why):
         run(lag(), parameters, inputs, **ONCE)
 

@@ -1,4 +1,4 @@
-"""Messages between vehicles: when they arrive, which are lost, what the receiver knows."""
+"""Messages between vehicles: times of arrival, losses, and the receiver's knowledge."""
 
 from __future__ import annotations
 
@@ -52,15 +52,11 @@ def events(parameters: Parameters, end: float, ages, y, receiver):
 
 
 links = st.builds(
-    Parameters,
-    period=st.floats(0.05, 3.0),
-    sound_speed=st.floats(5.0, 1500.0),
-    latency=st.floats(0.0, 2.0),
-    loss=st.sampled_from([0.0, 0.3, 1.0]),
-    seed=st.integers(-(2**31), 2**31 - 1),
-    outage_start=st.floats(0.0, 10.0),
+    Parameters, period=st.floats(0.05, 3.0), sound_speed=st.floats(5.0, 1500.0),
+    latency=st.floats(0.0, 2.0), loss=st.sampled_from([0.0, 0.3, 1.0]),
+    seed=st.integers(-(2**31), 2**31 - 1), outage_start=st.floats(0.0, 10.0),
     outage_duration=st.sampled_from([0.0, 5.0]),
-)
+)  # fmt: skip
 
 
 @given(links, st.floats(0.01, 4.0), st.integers(1, 60))
@@ -77,7 +73,7 @@ def test_link_is_the_simulation_of_its_events(parameters, h, n):
 
     states = [*run(parameters, h, n, y, receiver)]
     found = events(parameters, n * h, lambda sent: sent - h * int(sent / h + 1e-6), y, receiver)
-    # Where something happens at the end of a step, rounding decides.
+    # At the end of a step, rounding decides.
     moments = [sent for sent, _, _ in found] + [sent + late for sent, late, _ in found]
     apart = [s + late - r for s, late, _ in found for r, _, _ in found]
     clear = all(not near(m, h * round(m / h)) for m in moments if m > 0.0)
@@ -104,7 +100,7 @@ def test_messages_are_sent_at_their_times_whatever_the_step(h):
         assert state.newest.sent == pytest.approx(max(0, int(t - 1.5 + 1e-6)), abs=1e-9)
 
 
-def test_position_is_that_of_the_time_of_the_message():
+def test_position_belongs_to_the_time_of_the_message():
     for t, state in run(Parameters(), 0.02, 500, y=lambda t: (t, 0.0, 0.0)):
         assert state.newest.y[0] == pytest.approx(state.newest.sent, abs=1e-9)
         assert t - state.newest.sent <= 1.2 + 1e-9

@@ -1,4 +1,4 @@
-"""References in a formation: places, heading, exact derivatives, and what is refused."""
+"""References in a formation: places, heading, exact derivatives, and refusals."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from support.helix import helix
 
 DEFAULT = Parameters()
 
-#: All that follow from a number.
+#: Shapes that follow from a number.
 SHAPES = [shape for shape in Shape if shape != Shape.TABLE]
 
 
@@ -61,12 +61,8 @@ def test_places_of_four(shape, places):
         assert found == pytest.approx((x, y, 0.0), abs=1e-12)
 
 
-@given(
-    st.sampled_from(SHAPES),
-    st.integers(2, 64),
-    st.floats(0.1, 100.0),
-)
-def test_neighbours_are_the_spacing_apart_and_nobody_is_nearer(shape, vehicles, spacing):
+@given(st.sampled_from(SHAPES), st.integers(2, 64), st.floats(0.1, 100.0))
+def test_neighbours_are_the_spacing_apart_and_no_vehicle_is_nearer(shape, vehicles, spacing):
     stages = Stages()._replace(shape=(shape,) * 4, spacing=(spacing,) * 4)
     places = [
         formation.offset(Parameters(number, vehicles, stages), 0)
@@ -100,7 +96,7 @@ def test_place_is_twice_continuously_differentiable(parameters, t):
 
 
 @given(tables())
-def test_peaks_of_a_change_are_those_that_are_held_against_limits(parameters):
+def test_peaks_of_a_change_are_the_ones_compared_with_limits(parameters):
     stages = parameters.stages._replace(n=2)
     way = hypot(*(axis[1] - axis[0] for axis in (stages.x, stages.y, stages.z)))
     T = stages.duration[0]
@@ -180,7 +176,7 @@ def spiral(t: float, psi_0: float) -> Known:
     )
 
 
-def test_derivatives_of_the_reference_are_those_of_its_position():
+def test_derivatives_of_the_reference_are_its_positions():
     """Against differences, over two changes of place, a turn, and a jump of the heading.
 
     The third derivative of chi jumps where the turn does, so differences of dy_d are of first order
@@ -225,7 +221,7 @@ def test_places_beside_the_helix_of_the_paper_can_be_followed(shape, number):
 
 
 def test_three_vehicles_keep_their_line_beside_the_helix_of_the_paper():
-    """With plants, controllers and disturbances as in Fig. 4, from rest in their places.
+    """With plants, controllers and disturbances as in Fig. 4, each at rest at its own place.
 
     The distances are within the errors that each has: all planners have the same heading.
     """
@@ -266,7 +262,7 @@ def test_vehicle_points_along_its_reference_and_at_rest_with_the_formation():
     assert formation.posture(parameters, state, moving)[3:] == pytest.approx((pi / 4, 3 * pi / 4))
 
 
-# What is refused
+# Refusals
 
 
 @pytest.mark.parametrize(
@@ -346,7 +342,7 @@ def test_follower_that_has_lost_its_leader_coasts():
     [(2.0, "1.23", "58", "0.04"), (4.0, "2.09", "20", "0.12"), (1e9, "14.00", "11", "0.71")],
 )
 def test_follower_that_finds_its_leader_again(z_max, speed, duration, past):
-    """What formation.md says of it: the leader turns back just as the link fails."""
+    """The numbers of formation.md: the leader turns back just as the link fails."""
 
     def position(t):
         return (0.5 * min(t, 42.0) - 0.5 * max(0.0, t - 42.0), 0.0, 0.0)

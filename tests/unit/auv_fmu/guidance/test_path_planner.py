@@ -1,4 +1,4 @@
-"""The reference through waypoints: what it is, how smooth, and which paths are refused."""
+"""The reference through waypoints: its definition, its smoothness, and refused paths."""
 
 from __future__ import annotations
 
@@ -97,9 +97,7 @@ def test_reference_is_twice_continuously_differentiable(drawn):
 
 
 @given(timed())
-def test_reference_is_never_faster_than_its_fastest_leg_nor_outside_of_its_waypoints(
-    drawn,
-):
+def test_reference_is_never_faster_than_its_fastest_leg_nor_outside_of_its_waypoints(drawn):
     waypoints, t = drawn
     y_d, dy_d, _ = at(waypoints, t)
     legs = [path_planner.velocity(waypoints, k) for k in range(1, waypoints.n)]
@@ -159,7 +157,7 @@ def test_vehicle_under_what_a_level_circle_asks_for_goes_round_it(speed, radius)
 
 
 def test_helix_of_fig_4_asks_for_the_torques_that_drive_it():
-    """To 1 %: its climb is that of the path, not that of the vehicle, which drifts a little."""
+    """To 1 %: it climbs as the path does, and the vehicle drifts a little."""
     asked = demand(VEHICLE, ELL, motion_planner.reference(*helix_after(5000), ELL))
     assert asked.tau == pytest.approx((5.0, 1.0, 2.0), rel=0.01)
 
@@ -169,7 +167,7 @@ def test_surge_that_speeds_up_is_paid_for():
     assert demand(VEHICLE, ELL, straight).tau == pytest.approx((25 * 0.1 + 30 * 0.5, 0.0, 0.0))
 
 
-def test_climb_is_held_against_the_righting_moment():
+def test_climb_needs_a_moment_against_the_righting_moment():
     climb = Reference((0.0,) * 3, (0.4, 0.0, -0.3), (0.0, 0.0, 0.0))
     assert demand(VEHICLE, ELL, climb).tau == pytest.approx((15.0, 5.0 * 0.6, 0.0))
 
@@ -223,7 +221,7 @@ def is_too_steep(waypoints: Waypoints) -> bool:
     try:
         path_planner._check_pitch(waypoints)
     except ImpossiblePath as error:
-        assume("climbs or dives" in str(error))  # or it turns straight back
+        assume("climbs or dives" in str(error))  # or it turns back
         return True
     return False
 
@@ -254,7 +252,7 @@ def steepest(waypoints: Waypoints) -> float:
     moments = (times[:, None] + T * np.linspace(-0.5, 0.5, 4001)).ravel()
     a = np.clip((moments[:, None] - times) / T + 0.5, 0.0, 1.0)
     x, y, z = (a * a * (3.0 - 2.0 * a) @ jumps).T
-    # Slower than that, its direction is that of rounding errors.
+    # Slower than that, rounding errors decide its direction.
     moves = x * x + y * y + z * z > 1e-12 * np.max(legs * legs)
     return float(np.max(np.arctan2(np.abs(z), np.hypot(x, y)), where=moves, initial=0.0))
 
@@ -273,7 +271,7 @@ def test_path_is_refused_where_its_pitch_is_beyond_its_limit_and_nowhere_else(wa
 def test_pitch_of_one_corner_is_refused_where_the_closest_pass_by_the_vertical_is_beyond(
     one, other, turn
 ):
-    """Velocities in a rounding lie on the straight line from one to the other."""
+    """Velocities in a rounding are on the straight line from one to the other."""
     legs = [
         np.array([cos(climb) * cos(psi), cos(climb) * sin(psi), sin(climb)])
         for climb, psi in ((radians(one), 0.0), (radians(other), radians(turn)))
@@ -294,7 +292,7 @@ def test_path_at_the_steepest_is_let_pass():
         assert steepest(waypoints) == pytest.approx(motion_planner.STEEPEST, rel=1e-9)
 
 
-def test_rest_between_two_ways_is_no_turn_on_the_spot():
+def test_a_rest_may_separate_two_opposite_ways():
     check(Parameters(path((0, 0, 0), (9, 0, 0), (9, 0, 0), (0, 1, 0), t=(3.0, 30.0, 40.0, 70.0))))
 
 
@@ -337,7 +335,7 @@ def test_posture_points_along_the_path_and_carries_the_control_point(drawn):
     assert e1 @ along > 0.0
 
 
-def test_course_at_rest_is_that_of_the_leg_before_and_at_the_start_of_the_first():
+def test_course_at_rest_follows_the_leg_before_or_the_first():
     waypoints = path((0, 0, 0), (9, 0, 0), (9, 0, 0), (9, 9, 0), t=(10.0, 20.0, 40.0, 50.0))
     for t, direction in ((0.0, (1, 0, 0)), (30.0, (1, 0, 0)), (99.0, (0, 1, 0))):
         first = path_planner.first_corner(waypoints, 0.0)

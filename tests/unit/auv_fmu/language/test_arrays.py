@@ -64,7 +64,7 @@ def test_slices_and_elements_out_of_range_raise_as_a_tuples():
         Matrix(((1.0,),))[0, 1]
 
 
-def test_what_does_not_fit_together_is_refused():
+def test_operands_of_different_sizes_are_refused():
     with pytest.raises(TypeError, match="a Vector of 2 and a Vector of 3 do not fit together"):
         Vector((1, 2)) + Vector((1, 2, 3))
     with pytest.raises(TypeError, match="a Vector times a Vector: use @, or a number"):

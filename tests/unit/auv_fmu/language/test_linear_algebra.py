@@ -1,4 +1,4 @@
-"""What is computed with vectors and matrices, against numpy."""
+"""Computations with vectors and matrices, against numpy."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_solution_is_numpys(seed: int):
     np.testing.assert_allclose(x, np.linalg.solve(A, b), rtol=0.0, atol=tolerance)
 
 
-def test_a_zero_on_the_diagonal_is_no_obstacle_and_a_singular_matrix_is():
+def test_a_zero_on_the_diagonal_is_solved_and_a_singular_matrix_refused():
     assert solve(Matrix(((0.0, 1.0), (2.0, 0.0))), Vector((3.0, 4.0))) == (2.0, 3.0)
     with pytest.raises(ZeroDivisionError):
         solve(Matrix(((1.0, 2.0), (2.0, 4.0))), Vector((1.0, 1.0)))

@@ -57,7 +57,7 @@ def starts(seeds: np.ndarray) -> np.ndarray:
 
 
 def test_sequences_of_two_seeds_are_one_as_rarely_as_is_said():
-    """Of 300,000 seeds, some 4e-9 * 300,000^2 / 2 = 180 pairs, with a deviation of 13."""
+    """300,000 seeds have some 4e-9 * 300,000^2 / 2 = 180 pairs, with a deviation of 13."""
     seeds = np.unique(np.random.default_rng(1).integers(-(2**31), 2**31, 300_000))
     states = starts(seeds)
     assert [start(int(seed), 0) for seed in seeds[:50]] == [*states[:50]]

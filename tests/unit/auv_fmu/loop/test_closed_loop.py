@@ -1,4 +1,4 @@
-"""The loop of Fig. 2; tests/system holds the loop of FMUs against it."""
+"""The loop of Fig. 2; tests/system compares the loop of FMUs with it."""
 
 from math import sin, sqrt
 
@@ -17,7 +17,7 @@ QUIET = Parameters(noise=Localisation(std=0.0))
 
 
 def test_loop_starts_where_section_4_1_says():
-    """At rest, level and without noise; sin(0) = sign(0) = 0 leave nothing of (56)."""
+    """At rest, level and without noise; with sin(0) = sign(0) = 0 all of (56) vanishes."""
     [start] = closed_loop(0, Setting(plant=QUIET))
     y, origin = (2.35, 6.0, 0.0), (0.0, 0.0, 0.0)
     assert start.t == 0.0
@@ -62,7 +62,7 @@ def test_measurement_has_white_noise_of_the_localisation_systems_deviation():
     assert np.abs(neighbours - np.eye(6)).max() < 5.0 / sqrt(n)
 
 
-def test_noise_is_that_of_its_seed():
+def test_noise_follows_from_its_seed():
     def first(seed):
         [start] = closed_loop(0, Setting(plant=Parameters(noise=Localisation(seed=seed))))
         return start.scene.y

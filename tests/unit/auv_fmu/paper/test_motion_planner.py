@@ -85,7 +85,7 @@ def test_steady_turn_is_an_equilibrium_of_equation_2():
     assert VEHICLE.d66 * r == pytest.approx((VEHICLE.m11 - VEHICLE.m22) * u * v + 4.0, rel=1e-9)
 
 
-def test_reference_at_rest_accelerates_by_the_driving_torques_alone():
+def test_reference_at_rest_accelerates_by_the_driving_torques():
     """At rest ddy_d = J M_1^-1 tau_d, which is (14) without velocities."""
     state = PlannerState((0.0, 0.0, -2.0), 0.0, 0.0, (0.0,) * 5)
     moving = motion_planner.motion(VEHICLE, state, (5.0, 1.0, 2.0))

@@ -33,16 +33,9 @@ three = vectors(speeds, 3)
     ("form", "printed_jacobian"), [(Form.EULER, True), (Form.EULER, False), (Form.INTEGRAL, False)]
 )
 @given(
-    y=three,
-    euler=vectors(angles, 3),
-    y_d=three,
-    dy_d=three,
-    ddy_d=three,
-    y_hat=three,
-    dy_hat_o=three,
-    theta_hat=vectors(st.floats(0, 20), 4),
-    gains=vectors(st.floats(0.1, 20), 6),
-)
+    y=three, euler=vectors(angles, 3), y_d=three, dy_d=three, ddy_d=three, y_hat=three,
+    dy_hat_o=three, theta_hat=vectors(st.floats(0, 20), 4), gains=vectors(st.floats(0.1, 20), 6),
+)  # fmt: skip
 def test_law_is_48_to_51_in_matrices(
     function, form, printed_jacobian, y, euler, y_d, dy_d, ddy_d, y_hat, dy_hat_o, theta_hat, gains
 ):

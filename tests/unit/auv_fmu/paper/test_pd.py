@@ -16,15 +16,9 @@ three = vectors(speeds, 3)
 
 @pytest.mark.parametrize("printed_jacobian", [True, False])
 @given(
-    y=three,
-    euler=vectors(angles, 3),
-    y_d=three,
-    dy_d=three,
-    ddy_d=three,
-    dy=three,
-    theta_hat=vectors(st.floats(0, 20), 4),
-    gains=vectors(st.floats(0.1, 20), 4),
-)
+    y=three, euler=vectors(angles, 3), y_d=three, dy_d=three, ddy_d=three, dy=three,
+    theta_hat=vectors(st.floats(0, 20), 4), gains=vectors(st.floats(0.1, 20), 4),
+)  # fmt: skip
 def test_law_is_57_and_58_in_matrices(
     printed_jacobian, y, euler, y_d, dy_d, ddy_d, dy, theta_hat, gains
 ):

@@ -16,7 +16,7 @@ from auv_fmu.paper.plant import Integrator, Parameters, RollAxis
 from auv_fmu.paper.vehicle import Vehicle, accelerations, euler_rates
 from support.strategies import angles, forces, pitch_angles, speeds, vectors
 
-#: Section 4.1 has m44 = m55, behind which terms of roll could hide.
+#: Section 4.1 has m44 = m55, which could hide terms of roll.
 VEHICLE, ROLL = Vehicle(), RollAxis(m44=12.5, d44=18.0)
 MASSES = np.array([VEHICLE.m11, VEHICLE.m22, VEHICLE.m33, ROLL.m44, VEHICLE.m55, VEHICLE.m66])
 DAMPING = np.array([VEHICLE.d11, VEHICLE.d22, VEHICLE.d33, ROLL.d44, VEHICLE.d55, VEHICLE.d66])
@@ -26,7 +26,7 @@ PARAMETERS = Parameters(VEHICLE, ROLL)
 
 
 @given(nu=vectors(speeds, 6), euler=vectors(angles, 3))
-def test_undriven_plant_loses_energy_to_damping_alone(nu, euler):
+def test_undriven_plant_loses_energy_only_to_damping(nu, euler):
     """d/dt (nu' M nu / 2 + U) = -nu' D nu with U = -G cos(theta) cos(phi), for equal G."""
     G = VEHICLE.righting_pitch
     phi, theta, _ = euler
@@ -69,7 +69,7 @@ def test_disturbance_pushes_a_vehicle_at_rest_backwards_in_every_direction(tau_w
 
 
 @given(nu=vectors(speeds, 6), euler=vectors(angles, 3))
-def test_coriolis_terms_are_those_of_a_diagonal_mass_matrix(nu, euler):
+def test_coriolis_terms_follow_from_a_diagonal_mass_matrix(nu, euler):
     """M dnu/dt + C(nu) nu + D nu + g = 0, with C from the cross products of Kirchhoff."""
     M = np.diag(MASSES)
     momentum = M @ np.array(nu)
@@ -332,7 +332,7 @@ def test_undriven_vehicle_moves_as_the_water_that_it_displaces(integrator, rolls
 
 
 @pytest.mark.parametrize("mass", [0.0, 5.0, 17.0])
-def test_forces_of_accelerating_water_are_those_of_morison_and_kirchhoff(mass):
+def test_forces_of_accelerating_water_are_morisons_and_kirchhoffs(mass):
     """With rigid-body and added mass apart, and over ground, as Fossen writes it, by solve_ivp.
 
     M_RB dnu + C_RB(nu) nu + M_A dnu_r + C_A(nu_r) nu_r + D nu_r + g = tau + m R'a, with M_RB = m I
@@ -360,17 +360,10 @@ def test_forces_of_accelerating_water_are_those_of_morison_and_kirchhoff(mass):
         dflow = np.concatenate((matrix.T @ dwater + turning.T @ water, np.zeros(3)))
         nu_r = nu - flow
         righting = np.array(
-            (
-                0,
-                0,
-                0,
-                ROLL.righting_roll * matrix[2, 1],
-                -VEHICLE.righting_pitch * matrix[2, 0],
-                0,
-            )
+            (0, 0, 0, ROLL.righting_roll * matrix[2, 1], -VEHICLE.righting_pitch * matrix[2, 0], 0)
         )
         froude_krylov = np.concatenate((mass * (matrix.T @ dwater), np.zeros(3)))
-        # The rotational inertia stands in `added` as a whole: there nothing depends on the split.
+        # The rotational inertia is in `added` as a whole: there nothing depends on the split.
         rigid = np.array((mass, mass, mass, 0.0, 0.0, 0.0))
         applied = np.array((tau[0], 0, 0, 0, tau[1], tau[2])) - tau_w
         forces = (
@@ -415,7 +408,7 @@ def test_water_that_is_held_while_it_pushes_adds_its_acceleration_to_that_over_g
     np.testing.assert_allclose(seen(state, parameters).nu[:3], np.multiply(0.4, dwater), atol=1e-12)
 
 
-# What integrates
+# Integrators
 
 
 def ends(parameters, tau, tau_w, n, stop):
@@ -459,7 +452,7 @@ def test_integrators_have_the_orders_that_they_are_known_for(integrator, order, 
 
 
 def test_body_that_nothing_brakes_keeps_its_energy_with_rk4_and_gains_some_with_euler():
-    """Of M nu^2 / 2, in 20 s at 20 ms; Coriolis forces do no work."""
+    """The energy M nu^2 / 2, in 20 s at 20 ms; Coriolis forces do no work."""
     vehicle = VEHICLE._replace(d11=0.0, d22=0.0, d33=0.0, d55=0.0, d66=0.0, righting_pitch=0.0)
     roll = ROLL._replace(d44=0.0, righting_roll=0.0)
     gains = {}

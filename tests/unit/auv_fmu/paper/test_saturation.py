@@ -62,7 +62,7 @@ def test_slope_is_the_derivative(name, xi):
 @every
 @given(xi=numbers, k=positive)
 def test_lemma_1_i_and_ii(name, xi, k):
-    """The integral of s(k r) from 0 to xi is that of s from 0 to k xi, over k."""
+    """The integral of s(k r) from 0 to xi is the integral of s from 0 to k xi, over k."""
     area, s_M = integral(name, k * xi) / k, MAXIMUM_SLOPE[name]
     slack = ROUNDING * (1 + abs(area))
     assert s(name, k * xi) ** 2 / (2 * k * s_M) <= area + slack

@@ -1,4 +1,4 @@
-"""(33), (40), (42) and (47): what the theorems cover at most."""
+"""(33), (40), (42) and (47): the largest region that the theorems cover."""
 
 import numpy as np
 import pytest
@@ -19,8 +19,7 @@ DAMPED, QUICK = Vehicle(d11=500.0, d55=200.0, d66=200.0), Gains(lambda_=2.1)
 positive, units = st.floats(0.1, 100.0), st.floats(0.01, 2.0)
 three = vectors(speeds, 3)
 gains = st.builds(
-    lambda k_1, k_2, lambda_, k_d: Gains((k_1,) * 3, (k_2,) * 3, lambda_, k_d),
-    *[positive] * 4,
+    lambda k_1, k_2, lambda_, k_d: Gains((k_1,) * 3, (k_2,) * 3, lambda_, k_d), *[positive] * 4
 )
 
 
@@ -39,15 +38,9 @@ def test_alphas_are_those_below_40(gains):
 
 
 @given(
-    t_ez=three,
-    t_z=three,
-    r_1=three,
-    r_2=three,
-    gains=gains,
-    damping=vectors(positive, 3),
-    inertia=vectors(positive, 3),
-    v0=units,
-)
+    t_ez=three, t_z=three, r_1=three, r_2=three, gains=gains, damping=vectors(positive, 3),
+    inertia=vectors(positive, 3), v0=units,
+)  # fmt: skip
 def test_alphas_bound_what_is_known_of_37(t_ez, t_z, r_1, r_2, gains, damping, inertia, v0):
     """The terms of (37) without chi, xi and theta, for any D_2 and M_2, against (40).
 
@@ -136,7 +129,7 @@ def test_alpha_1_at_most_is_attained():
 
 @given(gains=gains, more=st.floats(1.0, 10.0))
 def test_no_gain_makes_alpha_3_larger(gains, more):
-    """It holds gains with a minus alone: the region does not grow with them."""
+    """It has gains only with a minus: the region does not grow with them."""
     alpha_3 = theorem(DAMPED, ELL, gains, 1.0).alphas.alpha_3
     for name in ("K1", "K2", "lambda_", "k_d"):
         larger = gains._replace(**{name: np.multiply(more, getattr(gains, name))})
@@ -210,7 +203,7 @@ def test_no_zetas_reach_further(room, k, share):
 
 @given(room=positive, k=positive, zeta_2=st.floats(0.0, 100.0), x=st.floats(0.0, 1.0))
 def test_no_ball_is_left_for_a_reference_that_moves(room, k, zeta_2, x):
-    """Faster than room / k, which is half of what (31) asks for: zeta_1 is k |dy_d| at least."""
+    """Faster than room / k, half of the bound of (31): zeta_1 is k |dy_d| at least."""
     speed = 0.5001 * reach(room, k)
     zeta_1 = k * speed
     assert not 2.0 * room - (zeta_1 + zeta_2) > zeta_1 + zeta_2 * x**2

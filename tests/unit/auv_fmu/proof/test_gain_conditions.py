@@ -1,4 +1,4 @@
-"""(30) to (32), (52) to (54), what they stand on, and the rates that the step must follow."""
+"""(30) to (32), (52) to (54), their assumptions, and the rates that the step must follow."""
 
 import re
 from math import hypot, sqrt
@@ -155,7 +155,7 @@ def test_chi_1_is_the_coupling_times_a_reference_ahead(vehicle, ell, speed, size
     """
     at, ahead = (vehicle, 0.0, YAW, STILL), turned((speed, 0.0, 0.0))
     k = coupling(vehicle, ell)
-    # Of the products that chi_1 adds up.
+    # Products that chi_1 adds up.
     rounding = 1e-13 * k * (speed + size) * size
     for sign in (1.0, -1.0):
         found, work = [], []

@@ -20,7 +20,7 @@ bounds_of_xi, widths = st.floats(0.0, 100.0), st.floats(0.1, 10.0)
 
 
 @given(theta=pitch_angles, psi=angles, r=three, ell=lengths)
-def test_kinetic_term_is_that_of_the_matrix_m_2(theta, psi, r, ell):
+def test_kinetic_term_has_the_matrix_m_2(theta, psi, r, ell):
     expected = 0.5 * np.array(r) @ M_2(VEHICLE, theta, psi, ell) @ np.array(r)
     found = kinetic(VEHICLE, rotation_from_euler(0.0, theta, psi), r, ell)
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)

@@ -1,4 +1,4 @@
-"""Fins and propeller from force and moments: the inverse of what the vehicle's own tail gives."""
+"""Fins and propeller from force and moments: the inverse of the vehicle's own tail."""
 
 from math import isfinite, pi, radians, sqrt
 
@@ -25,7 +25,7 @@ def given_by(command, nu_r):
 
 @given(delta_r=angles, delta_s=angles, n=st.floats(60.0, FASTEST_TURNING), nu_r=velocities)
 def test_it_inverts_the_tail_within_the_limits(delta_r, delta_s, n, nu_r):
-    """What the tail gives, ahead of the propeller's least thrust, is given back."""
+    """Force and moments of the tail, ahead of the propeller's least thrust, are given back."""
     wanted = given_by((delta_r, delta_s, n), nu_r)
     command, attained = evaluate(MEASURED, wanted, nu_r)
     assert command[:2] == pytest.approx((delta_r, delta_s), abs=1e-9)

@@ -1,4 +1,4 @@
-"""The hull of the REMUS 100: against what mechanics and Lamb say."""
+"""The hull of the REMUS 100, compared with mechanics and Lamb."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_added_mass_of_a_slender_hull_is_a_cylinders_across_and_none_along():
 
 @given(r_bg=st.tuples(*(st.floats(-0.3, 0.3),) * 3), nu=velocities)
 def test_mass_matrix_is_the_kinetic_energy(r_bg, nu):
-    """Of the hull, moved to its centre of mass, and of the water around it."""
+    """Inertia of the hull, moved to its centre of mass, and of the water around it."""
     mass, m = inertia(Hull(r_bg=r_bg)), Hull().mass
     v, omega = np.array(nu[:3]), np.array(nu[3:])
     at_centre = v + np.cross(omega, r_bg)
@@ -76,6 +76,6 @@ def test_lift_and_drag_brake(u, w):
     assert x * u + z * w < 0.0
 
 
-def test_drag_along_the_hull_is_that_of_its_front():
+def test_drag_along_the_hull_is_the_drag_of_its_front():
     x, _, z = lift_and_drag(Hull(), DRAG, 1026.0, 2.0, 0.0, 0.0)
     assert (x, z) == pytest.approx((-0.5 * 1026 * 4.0 * 0.42 * pi * 0.095**2, 0.0))

@@ -12,14 +12,14 @@ TAIL = Tail()
 speeds = st.floats(0.0, 3.0)
 
 
-def test_thrust_at_rest_is_that_of_the_coefficient():
+def test_thrust_at_rest_follows_from_its_coefficient():
     """rho D^4 KT n^2, with n in rev/s."""
     thrust, torque = propeller(TAIL, 1525.0 * pi / 30.0, 0.0)
     assert thrust == pytest.approx(1026 * 0.14**4 * 0.4566 * (1525 / 60) ** 2, rel=1e-12)
     assert torque == pytest.approx(1026 * 0.14**5 * 0.07 * (1525 / 60) ** 2, rel=1e-12)
 
 
-def test_thrust_at_the_largest_speed_is_that_of_the_other_coefficient():
+def test_thrust_at_the_largest_speed_follows_from_the_other_coefficient():
     """The published advance number belongs to 2.5 m/s at 1525 rev/min."""
     thrust, torque = propeller(TAIL, 1525.0 * pi / 30.0, 2.5)
     scale = 1026 * 0.14**4 * (1525 / 60) ** 2

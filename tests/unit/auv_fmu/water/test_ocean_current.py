@@ -1,4 +1,4 @@
-"""Ocean currents: the profile over depth, and the statistics of what varies."""
+"""Ocean currents: the profile over depth, and the statistics of its variation."""
 
 from math import cos, exp, pi, sin, sqrt
 from random import Random
@@ -47,7 +47,7 @@ def series(current, steps):
 
 
 def test_variation_has_its_deviation_and_its_correlation_time_whatever_the_steps():
-    """exp(-mu lag), in steps of 1 s, and in steps of 0.1 s to 8 s of which each pair makes 8.1 s.
+    """exp(-mu lag), in steps of 1 s, and in steps of 0.1 s to 8 s that add up to 8.1 s in pairs.
 
     n values with a correlation r from one to the next are as good as n (1 - r) / (1 + r) free ones
     for the mean, n (1 - r^2) / (1 + r^2) for the variance. Five deviations are allowed.
@@ -80,8 +80,8 @@ def test_no_deviation_means_none():
 
 
 @given(h=st.floats(1e-9, 1e12))
-def test_what_is_kept_and_what_is_added_make_up_the_same_variance(h):
-    """Of x' = kept x + added n, for any step: kept^2 + added^2 = 1."""
+def test_kept_and_added_parts_make_up_the_same_variance(h):
+    """x' = kept x + added n has kept^2 + added^2 = 1, for any step."""
     unit = Current(mu=0.05, sigma=1.0)
     none, one = (ocean_current.advance(unit, Variation(x, 0.0, 7.0), h).north for x in (0.0, 1.0))
     kept = one - none

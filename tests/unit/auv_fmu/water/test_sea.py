@@ -35,18 +35,13 @@ def test_water_moves_with_waves_and_current(z, t, depth):
 
 
 @given(
-    z=st.floats(-2.0, 19.0),
-    t=times,
-    depth=depths,
-    Hs=st.floats(0.1, 3.0),
-    s=st.sampled_from((0.0, 2.0, 10.0)),
-    speed=st.floats(0.0, 2.0),
-    root=st.sampled_from((0.0, 2.0, 7.0)),
-    seed=st.integers(0, 1000),
-)
-def test_acceleration_is_that_of_the_water_on_its_way(z, t, depth, Hs, s, speed, root, seed):
+    z=st.floats(-2.0, 19.0), t=times, depth=depths, Hs=st.floats(0.1, 3.0),
+    s=st.sampled_from((0.0, 2.0, 10.0)), speed=st.floats(0.0, 2.0),
+    root=st.sampled_from((0.0, 2.0, 7.0)), seed=st.integers(0, 1000),
+)  # fmt: skip
+def test_acceleration_follows_the_water_on_its_way(z, t, depth, Hs, s, speed, root, seed):
     """Central differences of the velocity, along the way that it goes: du/dt + (u . grad) u."""
-    assume(abs(z) > 0.01)  # where the vertical gradient jumps
+    assume(abs(z) > 0.01)  # there the vertical gradient jumps
     sea_waves = waves.Waves(Hs=Hs, s=s, direction=0.4, seed=seed)
     parameters = Sea(sea_waves, ocean_current.Current(speed, 2.0, root), depth)
     rows, h = sea.regular_waves(parameters), 1e-4
@@ -64,7 +59,7 @@ def test_acceleration_is_that_of_the_water_on_its_way(z, t, depth, Hs, s, speed,
 
 @given(t=times, z=st.sampled_from((0.0, 50.0, 60.0)))
 def test_acceleration_is_finite_at_the_surface_and_on_the_bottom(t, z):
-    """Where the slope of the profile is infinite, the water does not rise."""
+    """The water does not rise at an infinite slope of the profile."""
     parameters = Sea()
     rows = sea.regular_waves(parameters)
     moved = sea.water(parameters, rows, VARIATION, (0.0, 0.0, z), t)
@@ -77,7 +72,7 @@ def test_acceleration_is_finite_at_the_surface_and_on_the_bottom(t, z):
 
 
 def way_of_water(parameters, place, duration, h):
-    """Where the water goes that is at a place: its velocity, integrated by Runge-Kutta's scheme."""
+    """Path of the water from a place: its velocity, integrated by Runge-Kutta's scheme."""
     rows = sea.regular_waves(parameters)
 
     def velocity(x, t):
@@ -152,7 +147,7 @@ def test_a_vehicle_adrift_has_the_drift_of_stokes():
     a = waves.amplitude(parameters.waves)
     periods, h = 10, 2 * np.pi / omega / 300
     vehicle = adrift(auv_adrift, parameters, (0.0, 0.0, z), periods * 300 * h, h)
-    # The mean depth is not that of the start: from a crest the vehicle comes down.
+    # The mean depth differs from the start: from a crest the vehicle comes down.
     mean = vehicle[:, 2].mean()
     speed = (vehicle[-1, 0] - vehicle[0, 0]) / (periods * 300 * h)
     assert speed == pytest.approx(a * a * omega * k * np.exp(-2 * k * mean), rel=0.03)
@@ -166,7 +161,7 @@ def test_current_of_a_sea_without_waves():
 
 
 def test_waves_that_would_break_are_refused():
-    """Of 7 s, in deep water: lambda = g T^2 / (2 pi) = 76.5 m, and 0.142 of it 10.9 m."""
+    """A wave of 7 s in deep water: lambda = g T^2 / (2 pi) = 76.5 m, and 0.142 of it 10.9 m."""
     deep = Sea(depth=0.0)
     sea.check(deep._replace(waves=deep.waves._replace(Hs=10.8)))
     with pytest.raises(ImpossibleSea, match=r"waves\.Hs = 11 m is more than 10\.9 m, .* reduce"):

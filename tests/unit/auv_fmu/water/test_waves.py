@@ -1,4 +1,4 @@
-"""Waves: spectrum, directions, dispersion and the motion of the water, each held against theory."""
+"""Waves: spectrum, directions, dispersion and the motion of the water, compared with theory."""
 
 from itertools import pairwise
 from math import cos, exp, hypot, pi, sin, sqrt, tau
@@ -34,7 +34,7 @@ def density(sea, omega):
 
 
 def share_below(sea, omega):
-    """Of the energy between frequency zero and the highest one, by adaptive quadrature."""
+    """Share of the energy between frequency zero and the highest one, by adaptive quadrature."""
     peak, highest = tau / sea.Tp, sea.highest * tau / sea.Tp
 
     def energy(end):
@@ -62,7 +62,7 @@ def moved(sea, depth, position, t):
 @pytest.mark.parametrize("spectrum", [PIERSON_MOSKOWITZ, JONSWAP])
 @pytest.mark.parametrize(("n", "seed"), [(1, 5), (7, 1), (32, 1), (MOST, -3)])
 @pytest.mark.parametrize("gamma", [1.0, 3.3, 7.0])
-def test_each_wave_lies_in_its_own_equal_share_of_the_energy(spectrum, n, seed, gamma):
+def test_each_wave_is_in_its_own_equal_share_of_the_energy(spectrum, n, seed, gamma):
     """So its spectrum is as close to S as n lines can be; the integral of S is off by 1e-4."""
     sea = Waves(spectrum=spectrum, gamma=gamma, n=n, seed=seed)
     omegas = used(sea)[:, 0]
@@ -72,7 +72,7 @@ def test_each_wave_lies_in_its_own_equal_share_of_the_energy(spectrum, n, seed, 
 
 
 @given(Hs=st.floats(0.0, 20.0), n=st.integers(1, MOST))
-def test_variance_of_the_surface_is_that_of_the_significant_wave_height(Hs, n):
+def test_variance_of_the_surface_follows_from_the_significant_wave_height(Hs, n):
     a = waves.amplitude(Waves(Hs=Hs, n=n))
     assert n * a * a / 2 == pytest.approx(Hs * Hs / 16, rel=1e-14)
 
@@ -87,8 +87,7 @@ def record(sea, hours, step):
 
 
 @pytest.mark.parametrize(
-    ("spectrum", "records"),
-    [(JONSWAP, 1), *slow((JONSWAP, 12), (PIERSON_MOSKOWITZ, 12))],
+    ("spectrum", "records"), [(JONSWAP, 1), *slow((JONSWAP, 12), (PIERSON_MOSKOWITZ, 12))]
 )
 def test_spectrum_of_records_of_three_hours_is_the_analytic_one(spectrum, records):
     """Energies of ten bands, from periodograms with a window of Hann.
@@ -231,7 +230,7 @@ def test_motion_decays_with_depth_as_exp_of_minus_k_z(z):
 
 
 @given(k=st.floats(0.01, 5.0), depth=st.floats(0.5, 60.0), part=st.floats(0.0, 1.0))
-def test_attenuation_is_that_of_hyperbolic_functions(k, depth, part):
+def test_attenuation_follows_hyperbolic_functions(k, depth, part):
     assume(k * depth < 300.0)
     z = part * depth
     level, up = waves.attenuation(k, z, depth)
@@ -241,7 +240,7 @@ def test_attenuation_is_that_of_hyperbolic_functions(k, depth, part):
 
 @given(k=st.floats(1e-6, 1e9), z=st.floats(0.0, 1e9))
 def test_attenuation_never_overflows(k, z):
-    """In water of 1e9 m it is that of deep water, wherever waves are short against that."""
+    """Water of 1e9 m is like deep water, if waves are short against that."""
     assume(k > 1e-6)
     level, up = waves.attenuation(k, z, 1e9)
     assert 0.0 <= up <= level < 1e300

@@ -13,10 +13,10 @@ from fmus.language.build import Untranslatable
 from fmus.language.words import INSTEAD
 from support.language import HEAD, c_text, module_of
 
-#: A function of which `?` is a part.
+#: A function with a place for a part.
 HOW = "def f(x: float, v: Annotated[Vector, 3]) -> float:\n    ?\n    return x\n"
 
-#: What each kind of statement and expression is in.
+#: An example of each kind of statement and expression.
 PARTS = {
     # statements
     "AnnAssign": "x: float = 2.0 * x",
@@ -97,7 +97,7 @@ TRANSLATED = frozenset(
 
 
 def said_of_module(text: str, folder: Path) -> list[str]:
-    """What is said of the function f of a module."""
+    """Mistakes that are found in the function f of a module."""
     try:
         module = module_of(text, folder)
         c_text({"f": module.f})
@@ -177,7 +177,7 @@ def test_every_kind_of_this_python_has_an_example():
         ("    while x > 1.0:\n        pass", "a while that changes nothing in its condition"),
     ],
 )  # fmt: skip
-def test_what_is_outside_is_named_with_its_line_and_what_to_write(tmp_path, line, what):
+def test_other_python_is_refused_with_its_line_and_an_alternative(tmp_path, line, what):
     head = "from math import hypot\n\n\ndef f(x: float) -> float:\n"
     [said] = said_of_module(head + line + "\n", tmp_path)
     place, _, said = said.removeprefix("own.py:").partition(": ")

@@ -20,7 +20,7 @@ static void *cleared(size_t n, size_t size) { return succeeds() ? calloc(n, size
 #define calloc cleared
 #include "fmi2.c"
 
-/* What there is enough memory for is answered as ever. */
+/* Calls for which there is enough memory are answered as usual. */
 static void note(int status, int expected) {
     if (status != FMI_ERROR && status != expected) exit(1);
     if (status != expected && failures == 0) exit(3);

@@ -1,4 +1,4 @@
-/* What is behind FMI's functions, for tests. */
+/* Internal functions of the runtime, for tests. */
 #include "platform.h"
 
 #ifdef DECIMAL_COMMA
@@ -12,7 +12,7 @@ static int with_comma(char *text, size_t size, const char *format, ...) {
     va_start(arguments, format);
     int length = vsnprintf(text, size, format, arguments);
     va_end(arguments);
-    /* Of a number: the first directive of a text is another. */
+    /* Shows a number: the first directive of a text is another. */
     if (strspn(format + 1, "+ .*0123456789") == strcspn(format + 1, "eEfgG") &&
         strchr(text, '.') != NULL) {
         *strchr(text, '.') = ',';

@@ -29,16 +29,12 @@ from support.language import HEAD, TOO_LARGE, Twins, c_text, module_of, sizes_of
 ZIG = (sys.executable, "-m", "ziglang", "cc")
 
 #: Compilers, as FMUs are compiled by them.
-COMMANDS = {
-    "gcc": ("gcc", "-O2"),
-    "clang": ("clang", "-O2"),
-    "zig": (*ZIG, "-O2"),
-}
+COMMANDS = {"gcc": ("gcc", "-O2"), "clang": ("clang", "-O2"), "zig": (*ZIG, "-O2")}
 
 #: One that is there.
 COMPILED = next((name for name in ("gcc", "clang") if shutil.which(name)), "")
 
-#: What the functions share.
+#: Constants and classes of all functions.
 SHARED = '''
 class Mode(IntEnum):
     """An enumeration."""
@@ -664,7 +660,7 @@ CONSTRUCTS = {
     ),
 }  # fmt: skip
 
-#: What Python takes and means otherwise than its annotations say.
+#: Constants and functions whose annotations are wrong.
 WRONG_CONSTANTS = """
 class Default(NamedTuple):
     a: float
@@ -769,7 +765,7 @@ def test_python_and_c_agree_bit_for_bit(
     def agree(numbers: tuple[float, ...]) -> None:
         python, c = both.python(function, numbers), both.c(function, numbers)
         if c.error == TOO_LARGE:
-            # C has no room where Python goes on: it says so, and gives no other number.
+            # C has no room where Python has: it reports that, and gives no other number.
             return
         assert bool(python.error) == bool(c.error)
         if name.startswith("raise"):
@@ -779,10 +775,10 @@ def test_python_and_c_agree_bit_for_bit(
     agree()
 
 
-def test_no_element_is_read_of_what_may_have_ended(
+def test_no_element_of_a_temporary_value_is_read(
     twins: dict[str, Twins], tmp_path_factory: pytest.TempPathFactory
 ):
-    """C99, 6.5.2.2: the result of a function, after the next sequence point."""
+    """C99, 6.5.2.2: a function's result ends with the next sequence point."""
     text = twins_of(twins, COMPILED, tmp_path_factory).text
     assert not re.search(r"\)(\.\w+)*\.v\[", text)
 
@@ -986,7 +982,7 @@ def test_a_variable_may_be_named_as_c_would_name_what_it_uses(tmp_path: Path):
 
 
 def test_a_choice_of_many_is_written_side_by_side():
-    """In a thread, whose stack is empty."""
+    """A thread has an empty stack."""
     x = tree.Local("x", FLOAT)
     body: list[tree.Statement] = [tree.Return(x)]
     for k in range(900):
@@ -1000,7 +996,7 @@ def test_a_choice_of_many_is_written_side_by_side():
 
 
 def test_variables_are_declared_in_the_order_of_their_first_use(tmp_path: Path):
-    """In each process: the GUID of an FMU follows from its text."""
+    """The GUID of an FMU follows from its text, which must be the same in each process."""
     names = "qwertyuiop"
     stores = [f"{name} = {i}.0 * x" for i, name in enumerate(names)]
     text = HEAD + (
@@ -1040,7 +1036,7 @@ def test_classes_functions_and_constants_share_no_name(tmp_path: Path):
 
 
 def test_constants_of_one_name_keep_their_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """One is imported and defined anew, one imported by another name, one like a member."""
+    """One is imported and redefined, one imported by another name, one like a member."""
     monkeypatch.syspath_prepend(str(tmp_path))
     (tmp_path / "gains.py").write_text(
         "from __future__ import annotations\n\nGAIN = 2.0\nOTHER = 3.0\n\n\n"
@@ -1082,7 +1078,7 @@ def test_comments_stay_comments(tmp_path: Path):
 
 
 def test_numbers_of_numpy_are_refused(tmp_path: Path):
-    """What they meet becomes one of them, which divides by zero."""
+    """An operation with one gives another, which divides by zero."""
     text = HEAD.replace("import math\n", "import math\n\nimport numpy as np\n") + (
         "G = np.float64(2.0) * 1.5\n\n\ndef f(x: float) -> float:\n    return G * x\n"
     )
@@ -1091,7 +1087,7 @@ def test_numbers_of_numpy_are_refused(tmp_path: Path):
 
 
 def test_functions_are_files_of_one_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """What a component's modules import from beside them is translated with it."""
+    """Modules in the folder of a component are translated with it."""
     (tmp_path / "helpers_beside.py").write_text(
         "from __future__ import annotations\n\n\ndef half(x: float) -> float:\n    return x / 2.0\n"
     )

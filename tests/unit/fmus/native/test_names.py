@@ -28,7 +28,6 @@ COMMANDS = {
     "this machine's": (str(machines_compiler()),),
     "Windows": (*ZIG, "x86_64-windows-gnu"),
     "macOS": (*ZIG, "aarch64-macos"),
-    "musl": (*ZIG, "x86_64-linux-musl"),
 }
 
 #: Uses a variable beside everything that equations call.
@@ -62,7 +61,7 @@ def marked(name: str):
 
 @pytest.mark.parametrize("system", [marked(name) for name in COMMANDS])
 def test_every_name_that_a_compiler_knows_can_be_a_variable_and_a_function(tmp_path, system):
-    """Macros, functions, types, and all else that the headers of the runtime say."""
+    """Macros, functions, types, and every other name in the headers of the runtime."""
     command = COMMANDS[system]
     files = sources(source_of("PdController").definition)
     for name, text in files.items():
@@ -106,7 +105,7 @@ places = st.tuples(identifiers, identifiers)
     functions=st.lists(places, unique=True),
     constants=st.lists(st.tuples(places, st.sampled_from([0.5, 2.0, 3]))),
 )
-def test_all_that_stands_outside_of_functions_has_a_name_of_its_own(classes, functions, constants):
+def test_names_outside_of_functions_are_unique(classes, functions, constants):
     """Classes, arrays and tuples of them, functions and constants, in modules of any name."""
     records = [type_of(NamedTuple(name, [("x", float)])) for name in classes]
     types = [t for one in records for t in (one, Array(one, 3), Record((("m0", one), ("m1", INT))))]

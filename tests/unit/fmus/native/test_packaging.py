@@ -1,4 +1,4 @@
-"""What is in an FMU of the native kind, and what its GUID follows from."""
+"""Contents of an FMU of the native kind, and its GUID."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_archive_holds_what_the_standard_names(name: str, fmi: str):
 
 
 @pytest.mark.parametrize("fmi", FILES)
-def test_identity_is_that_of_the_description(fmi: str):
+def test_identity_is_in_the_description(fmi: str):
     contents = entries("AuvPlant", fmi)
     identity = contents["sources/identity.h"].decode()
     assert f'#define MODEL_GUID "{guid(contents)}"' in identity
@@ -88,7 +88,7 @@ def test_guid_follows_from_sources_and_description(monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.parametrize("name", REPRESENTATIVES)
-def test_licence_and_page_say_nothing_of_what_is_not_in_it(name: str):
+def test_licence_and_page_name_only_software_in_the_fmu(name: str):
     contents = entries(name)
     licence = contents["documentation/licenses/license.txt"].decode()
     assert "MIT License" in licence

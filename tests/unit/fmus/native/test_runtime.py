@@ -1,4 +1,4 @@
-"""What all FMUs in C have in common, held against Python's own, and compiled as hosts may do it."""
+"""The runtime of FMUs in C, compared with Python's functions, and compiled as hosts may do it."""
 
 from __future__ import annotations
 
@@ -17,13 +17,14 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from fmus.discovery import components, source_of
+from fmus.discovery import source_of
 from fmus.native.packaging import sources
 from fmus.native.translator import _directives
 from fmus.ports.behaviour import NUMBER_FORMAT
 from fmus.ports.description import SOURCES
 from fmus.python.component import LONGEST_MESSAGE
 from support.language import HEAD, Twins, module_of
+from support.settings import NAMES
 
 COMPILERS = [command for command in ("gcc", "clang") if shutil.which(command)]
 
@@ -135,7 +136,7 @@ def test_numbers_are_written_as_python_writes_them(runtime: Runtime, number: flo
 
 
 def test_powers_of_two_are_written_as_python_writes_them(runtime: Runtime):
-    """Below one numbers lie closer than above it, and other digits may be the fewest."""
+    """Below a power of two, numbers are closer than above it, and the fewest digits differ."""
     for number in POWERS_OF_TWO:
         assert runtime.shown(number, exactly=True) == repr(number)
 
@@ -168,7 +169,7 @@ def test_messages_are_formatted_as_python_formats_them(
     assert comma.shown_in(form, number) == expected
 
 
-#: What is shown in the locale of a process of its own.
+#: Shows numbers in the locale of a process of its own.
 _IN_GERMAN = """\
 import locale, sys
 from ctypes import CDLL, c_char_p, c_double, create_string_buffer
@@ -200,10 +201,10 @@ def test_german_locale_of_the_host_is_not_seen(runtime: Runtime, tmp_path: Path)
     ]  # fmt: skip
 
 
-#: How many texts there are.
+#: Number of texts.
 TEXTS = 60
 
-#: What is between the numbers of a text.
+#: Pieces between the numbers of a text.
 PIECES = ("100 % ", "%%", "%d", "%n ", "ü" * 90, "𝜃" * 200, "{{", "}}", "\\\\", "\\'", " ist ", "€")
 FIELDS = ("{x:g}", "{x:.3f}", "{x:+.2e}", "{y: 9.1f}", "{k}", "{k:d}", "{k:.1f}", "{on}", "{y:G}")
 
@@ -241,7 +242,7 @@ def test_long_text_is_cut_between_characters(runtime: Runtime):
     assert runtime.text("𝜃".encode() * 100_000) == "𝜃".encode() * MOST_CHARACTERS
 
 
-def test_bytes_that_are_no_text_are_cut_where_the_room_ends(runtime: Runtime):
+def test_invalid_text_is_cut_where_the_room_ends(runtime: Runtime):
     assert runtime.text(b"\x80" * 100_000) == b"\x80" * (ROOM - 1)
 
 
@@ -253,7 +254,7 @@ def can_be_decoded(content: bytes) -> bool:
     return True
 
 
-#: Bytes that stand at borders of what UTF-8 allows.
+#: Bytes at the borders of the ranges of UTF-8.
 ODD_BYTES = st.lists(st.sampled_from(b"a\x80\x8f\x90\x9f\xa0\xbf\xc0\xc2\xe0\xed\xf0\xf4\xf5")).map(
     bytes
 )
@@ -268,7 +269,7 @@ def test_utf8_is_what_python_takes_for_it(runtime: Runtime, content: bytes):
 
 
 @given(content=st.binary(max_size=5000))
-def test_checksum_is_that_of_zip(runtime: Runtime, content: bytes):
+def test_checksum_is_the_one_of_zip(runtime: Runtime, content: bytes):
     assert runtime.checksum(content) == crc32(content)
 
 
@@ -277,7 +278,7 @@ def test_checksum_is_that_of_zip(runtime: Runtime, content: bytes):
 @example(seed=1)
 @example(seed=2**31)
 @example(seed=2**32 - 1)
-def test_noise_is_that_of_python(runtime: Runtime, seed: int):
+def test_noise_is_pythons(runtime: Runtime, seed: int):
     """To the bit, over more numbers than the generator makes at once."""
     random = Random(seed)
     expected = [random.gauss(0.0, 1.0) for _ in range(1001)]
@@ -291,13 +292,18 @@ def bits(numbers: list[float]) -> bytes:
 # Compiling
 
 
-@pytest.mark.parametrize("compiler", COMPILERS)
 @pytest.mark.parametrize(
-    ("name", "version"), [*((name, "2") for name in components()), ("AuvPlant", "3")]
+    ("name", "version", "standard"),
+    [*((name, "2", "c99") for name in NAMES), ("AuvPlant", "3", "c99"), ("AuvPlant", "2", "gnu17")],
 )
-def test_sources_are_c99_without_a_warning(tmp_path: Path, name: str, version: str, compiler: str):
+def test_sources_have_no_warning(tmp_path: Path, name: str, version: str, standard: str):
     folder = written(tmp_path, name, version)
-    compile_in(folder, "-fsyntax-only", SOURCES[version], compiler=compiler)
+    for compiler in COMPILERS:
+        options = f"-std={standard}", "-fsyntax-only"
+        compile_in(folder, *options, SOURCES[version], compiler=compiler)
+        if compiler == "gcc":
+            strict = "-Wshadow=local", "-Wconversion", "-Wno-unused-function"
+            compile_in(folder, *options, *strict, "equations.c")
 
 
 LINKED = """
@@ -352,7 +358,7 @@ def test_several_components_can_be_linked_into_one_program(tmp_path: Path):
 
 
 def test_memory_that_there_is_not_is_an_error_and_nothing_worse(tmp_path: Path):
-    """Whichever allocation fails first, with all that come after it."""
+    """Each allocation in turn fails, and with it every later one."""
     folder = written(tmp_path / "sources", "AuvPlant")
     source = Path(__file__).with_name("no_memory.c")
     sanitizers = ("-fsanitize=address,undefined", "-fno-sanitize-recover")

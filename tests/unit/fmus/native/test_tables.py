@@ -1,4 +1,4 @@
-"""The tables of ports and of the state in C, for what the components of the bundle do not have."""
+"""The tables of ports and of the state in C, for types that the bundle lacks."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def chosen(name: str, choices: dict[str, int]) -> Port:
 
 
 def row_of(name: str) -> list[str]:
-    """What stands in the table of ports after a name."""
+    """Columns of the table of ports after a name."""
     [row] = re.findall(rf'    {{"{re.escape(name)}", (.*)}},\n', tables(build.definition()))
     return row.split(", ")
 
 
-def test_parameters_lie_in_the_structures_of_the_equations():
+def test_parameters_have_places_in_the_structures_of_the_equations():
     places = {
         "K[2,1]": "model.K.v[1].v[0]",
         "offset[3]": "model.offset.v[2]",
@@ -78,7 +78,7 @@ def test_members_of_enumerations_are_choices_of_ports_and_states():
 
 
 def test_choices_of_two_ports_whose_names_differ_in_a_dot_are_two_tables():
-    """A name in C has none."""
+    """Names in C have no dots."""
     ports = [chosen(name, {"a": 0}) for name in ("kind.x", "kind_x", "kind")]
     assert names_of_choices(ports) == {
         "kind.x": "choices_of_kind_x",

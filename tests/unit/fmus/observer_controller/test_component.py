@@ -17,7 +17,7 @@ from support.strategies import speeds, vectors
 three = vectors(speeds, 3)
 
 
-def test_gate_is_logged_and_is_no_fault():
+def test_gate_is_logged_without_a_fault():
     driver = ClassInstance("ObserverController")
     driver.set(y__x=5.0)
     assert driver.step()

@@ -1,4 +1,4 @@
-"""PathPlanner: the corner ahead, which goes along in the state."""
+"""PathPlanner: the corner ahead, which is part of the state."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ paths = st.builds(
     lambda **values: Waypoints(**values),  # noqa: PLW0108
     timed=st.booleans(),
     rounding=st.floats(0.5, 40.0),
-)  # what is not given keeps its start value
+)  # all others keep their start values
 
 
 @given(paths, st.floats(-10.0, 10.0), st.lists(st.floats(-20.0, 40.0), max_size=20))

@@ -1,4 +1,4 @@
-"""What a component may say: each mistake is told in one line that names it."""
+"""Hooks of a component: each mistake is reported in one line that names it."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def behaviour(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str):
     return read_behaviour(import_module("own_behaviour"))
 
 
-def test_types_and_hooks_are_those_of_the_text(tmp_path, monkeypatch):
+def test_types_and_hooks_are_read_from_the_text(tmp_path, monkeypatch):
     said = behaviour(tmp_path, monkeypatch, GOOD)
     assert [name for name, hook in said.hooks.items() if hook] == ["start", "outputs", "update"]
     assert (said.state.__name__, said.parameters.__name__) == ("State", "Gains")
@@ -103,11 +103,7 @@ def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, 
         ),
         ("(h: float,", "(h,", "update takes h of no type$"),
         ("(h: float,", "(h: real,", "update has a type that is not known: name 'real' is not "),
-        (
-            "-> Outputs:",
-            "-> tuple[float, float]:",
-            r"outputs returns tuple\[float, f",
-        ),
+        ("-> Outputs:", "-> tuple[float, float]:", r"outputs returns tuple\[float, f"),
         ("(h: float,", "(h: float, dt: float,", "update takes dt, which is not one of"),
         ("\n\ndef _moved", f"{SEED}\n\ndef _moved", "has seed, but no measured"),
         ("\n\ndef _moved", f"{MEASURED}\n\ndef _moved", "has measured, but no seed"),
@@ -196,7 +192,7 @@ RESTARTED = "again"
 
 _Y = "Annotated[Vector, 2]"
 
-#: What each argument and each result is, as the documentation of the hooks says.
+#: Types of each argument and each result, from the documentation of the hooks.
 RIGHT: dict[str, dict[str, str]] = {
     "check": {"parameters": "Parameters", "return": "None"},
     "start": {"parameters": "Parameters", "inputs": "Inputs", "t": "float", "return": "State"},
@@ -265,7 +261,7 @@ def test_no_other_type_is_taken(monkeypatch, hook, argument):
             read_behaviour(module)
         told = str(caught.value)
         assert len(told.splitlines()) == 1
-        # What some return is what others are held against.
+        # Results of start and outputs are compared with arguments of other hooks.
         assert caught.value.place[0] == hook or hook in ("start", "outputs")
         assert argument in (*caught.value.place, "return"), wrong
 

@@ -1,4 +1,4 @@
-"""A component is what its modules say: one module says it all."""
+"""The definition of a component, from one module."""
 
 from __future__ import annotations
 
@@ -204,7 +204,7 @@ def test_names_are_told_apart_from_those_that_a_component_has_anyway(defined):
 
 @pytest.mark.parametrize("name", ["u", "Length"])
 def test_a_type_of_choices_has_a_name_of_its_own(defined, name):
-    """FMI holds the names of types apart from each other and from those of variables."""
+    """In FMI the names of types differ from each other and from names of variables."""
     choice = f"class {name}(IntEnum):\n    OFF = 0\n\n\nclass State"
     own = f'    mode: Annotated[{name}, Variable("1", "Mode")] = {name}.OFF\n    T: Anno'
     with pytest.raises(

@@ -33,17 +33,11 @@ PORTS = (
     Port("n", "parameter", "fixed", "Integer", "Number", start=-3),
     Port("on", "parameter", "fixed", "Boolean", "Switch", start=True),
     Port(
-        "kind",
-        "parameter",
-        "fixed",
-        "Enumeration",
-        "Kind",
-        start=1,
-        choices={"soft": 1, "hard": 4},
-        enumeration="Kind",
+        "kind", "parameter", "fixed", "Enumeration", "Kind", start=1,
+        choices={"soft": 1, "hard": 4}, enumeration="Kind",
     ),
     FAULT,
-)
+)  # fmt: skip
 
 BEFORE = """
 <fmiModelDescription guid="1">

@@ -124,7 +124,7 @@ def test_members_may_have_units_of_their_own():
         (Variable("m", "Place", members=(2, 3), name="stage[{}].t"), ["stage[2].t", "stage[3].t"]),
     ],
 )
-def test_a_name_may_be_another_than_that_of_the_field(said, names):
+def test_a_name_may_differ_from_the_name_of_the_field(said, names):
     assert [port.name for port in ports("input", p=Annotated[Vector, 2, said])] == names
 
 
@@ -147,7 +147,7 @@ def test_choices_that_differ_in_capitals_only_are_refused():
         ports("input", p=Annotated[alike, PLAIN])
 
 
-def test_elements_start_with_those_of_the_default_value():
+def test_elements_start_with_the_elements_of_the_default_value():
     rows = Matrix(((1.0, 2.0), (3.0, 4.0)))
     found = ports("parameter", K=(Annotated[Matrix, 2, 2, METRES], rows))
     assert [port.start for port in found] == [1.0, 2.0, 3.0, 4.0]
@@ -284,7 +284,7 @@ kinds: st.SearchStrategy[Any] = st.sampled_from(
 
 @st.composite
 def fields(draw: st.DrawFn) -> tuple[Any, Any]:
-    """A type with what is said of it, and a start value."""
+    """A type with a declaration, and a start value."""
     kind, start = draw(kinds)
     unit = "N" if kind[0] in (float, Vector, Matrix) else "1"
     bounds = (draw(mostly(None, numbers)) for _ in range(2))

@@ -12,15 +12,7 @@ import pytest
 from auv_fmu import Matrix, Variable, Vector
 from auv_fmu.language.quantities import NU, POSITION, TAU, per_axis
 from fmus.ports.fields import declared
-from fmus.ports.groups import (
-    SCOPE,
-    Nothing,
-    ParameterSet,
-    hints_of,
-    packed,
-    slices,
-    unpacking,
-)
+from fmus.ports.groups import SCOPE, Nothing, ParameterSet, hints_of, packed, slices, unpacking
 from fmus.ports.port import Port
 
 Vector3 = tuple[float, float, float]
@@ -33,7 +25,7 @@ def ports_of(made: type, causality: str = "input") -> list[Port]:
 
 
 def packing(made: type) -> Callable[[Any], list[Any]]:
-    """What a slave does with the outputs, whose text it puts into its own."""
+    """Compile functions as a slave does, into whose text they are written."""
     groups = {name: f"it.{name}" for name in hints_of(made)}
     function: Callable[[Any], list[Any]] = eval(f"lambda it: {packed(made, groups)}", {**SCOPE})
     return function

@@ -1,4 +1,4 @@
-"""What an index may say: each mistake is told in one line that names it."""
+"""Indices: each mistake is reported in one line that names it."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_what_an_index_says(tmp_path, monkeypatch):
     assert is_reducer(sys.modules["own_index"])
 
 
-def test_it_says_of_which_end_of_a_run_it_is(tmp_path, monkeypatch):
+def test_the_end_of_the_run_that_it_describes_is_declared(tmp_path, monkeypatch):
     assert reducer(tmp_path, monkeypatch, f"{GOOD}\n\nLAST = 3\n").last == 3.0
 
 

@@ -29,24 +29,17 @@ def test_infinities_that_cancel_are_found():
 @pytest.mark.parametrize(
     ("name", "parameter", "value"),
     [
-        ("AuvPlant", "m11", 0.0),
-        ("AuvPlant", "d66", -1.0),
-        ("AuvPlant", "noise__std", nan),
-        ("AuvPlant", "h_max", 0.0),
-        ("MotionPlanner", "m55", -22.5),
-        ("MotionPlanner", "tau_d__u", inf),
-        ("ObserverController", "eps_t", 0.0),
-        ("AuvPlant", "actuator__T__u", -0.1),
-        ("AuvPlant", "current__x", nan),
-        ("ObserverController", "saturation", 4),
-        ("ObserverController", "observer", -1),
-        ("ObserverController", "k_d", -50.0),
-        ("DisturbanceGenerator", "omega_d", nan),
+        ("AuvPlant", "m11", 0.0), ("AuvPlant", "d66", -1.0), ("AuvPlant", "noise__std", nan),
+        ("AuvPlant", "h_max", 0.0), ("MotionPlanner", "m55", -22.5),
+        ("MotionPlanner", "tau_d__u", inf), ("ObserverController", "eps_t", 0.0),
+        ("AuvPlant", "actuator__T__u", -0.1), ("AuvPlant", "current__x", nan),
+        ("ObserverController", "saturation", 4), ("ObserverController", "observer", -1),
+        ("ObserverController", "k_d", -50.0), ("DisturbanceGenerator", "omega_d", nan),
         ("PdController", "sigma", -1.0),
     ],
-)
+)  # fmt: skip
 def test_wrong_parameter_is_an_error_before_the_run(name, parameter, value):
-    """There are hosts that ignore fmi2Discard: they would run with the value before."""
+    """Some hosts ignore fmi2Discard: they would run with the earlier value."""
     driver = ClassInstance(name, **{parameter: value})
     dotted = parameter.replace("__", ".")
     [port] = [port for port in driver.ports if port.name == dotted]
@@ -57,7 +50,7 @@ def test_wrong_parameter_is_an_error_before_the_run(name, parameter, value):
 
 
 def test_without_a_loader_no_step_is_made_with_another_value():
-    """The host has been answered fmi2OK, and shall not find out by its results."""
+    """The host was answered fmi2OK, and must not have to find out by its results."""
     driver = ClassInstance("AuvPlant", plain=True, m11=0.0)
     assert driver.answers() == []
     for _ in range(2):
@@ -67,7 +60,7 @@ def test_without_a_loader_no_step_is_made_with_another_value():
 
 
 def test_integers_and_truth_values_can_be_read_as_numbers(driver):
-    """There are hosts that read all outputs with fmi2GetReal."""
+    """Some hosts read all outputs with fmi2GetReal."""
     for reference, port in enumerate(driver.ports):
         [number] = driver.slave.get_real([reference])
         assert type(number) is float
@@ -124,7 +117,7 @@ def test_library_beside_the_loader_tells_a_slave_of_it(tmp_path, libraries, plai
         ("AuvPlant", {"tau_max__u": 1e300}, {"tau__u": 1e300}),
     ],
 )
-def test_one_wild_sample_is_refused_and_the_run_goes_on_after_it(name, start, sample):
+def test_one_wild_sample_is_refused_and_the_run_continues(name, start, sample):
     driver, calm = ClassInstance(name, **start), ClassInstance(name, **start)
     driver.set(**sample)
     assert not driver.step()
@@ -170,7 +163,7 @@ def test_largest_noise_leaves_the_largest_position_finite():
 
 
 def test_noise_of_a_refused_step_is_not_lost():
-    """y after a refused step is y without it: the same numbers are drawn."""
+    """y after a refused step equals y without it: the same numbers are drawn."""
     driver, calm = ClassInstance("AuvPlant"), ClassInstance("AuvPlant")
     driver.set(tau_w__p=1e300)
     driver.step()

@@ -82,7 +82,7 @@ def test_modules_of_packages_are_found_wherever_these_are(own: Path):
     assert sorted(modules_of("import pack, plain", {"pack": package}, None)) == ["pack/__init__.py"]
 
 
-#: What a script says, and what it says when `a` and `b` have names that end in `_x`.
+#: A script, and the same script when `a` and `b` have names that end in `_x`.
 IMPORTS = {
     "from a import z": "from a_x import z",
     "from a.c import z": "from a_x.c import z",
@@ -117,7 +117,7 @@ def test_texts_keep_their_encoding(encoding: str):
 
 
 class Imported:
-    """A module that is not there, and all that is in it."""
+    """A module that does not exist, or a name in one."""
 
     def __init__(self, path: str) -> None:
         self.path = path
@@ -127,7 +127,7 @@ class Imported:
 
 
 def bound(text: str) -> dict[str, str]:
-    """What the names that a text imports stand for."""
+    """The objects that a text imports, by their names."""
 
     def load(name: str, *arguments: object) -> Imported:
         return Imported(name if arguments[2] else name.partition(".")[0])
@@ -163,7 +163,7 @@ def test_extension_modules_are_taken_as_they_are(own: Path):
     assert sorted(modules_of("import fast", {}, own)) == [f"fast{EXTENSION_SUFFIXES[0]}"]
 
 
-def test_a_module_that_is_no_python_is_named(own: Path):
+def test_a_module_with_invalid_python_is_named(own: Path):
     (own / "plain.py").write_text("def (\n")
     with pytest.raises(SyntaxError) as caught:
         modules_of("import plain", {}, own)

@@ -20,7 +20,7 @@ def test_what_is_taken_back_is_drawn_again_at_any_place_of_a_long_run():
         assert noise.draw() == (gauss(0.0, 1.0), gauss(0.0, 1.0), gauss(0.0, 1.0))
 
 
-def test_a_restored_generator_goes_on():
+def test_a_restored_generator_continues():
     noise = Noise(Random(7), 3)
     noise.draw()
     other = Noise.restored(noise.state, 3)

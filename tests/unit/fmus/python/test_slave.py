@@ -1,4 +1,4 @@
-"""A slave of a component as small as can be, dx/dt = gain a, seen as b; and how slaves are made."""
+"""A slave of a component of one equation, dx/dt = gain a, with the output b."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ GAIN, UP, MOST, H_MAX, FAULT = 5, 6, 7, 8, 9
 
 @pytest.fixture
 def slave():
-    """Made within the test that uses it, so that the making is part of what is tested."""
+    """A slave made within the test, so that its class is made there, too."""
     made = slave_of.__wrapped__("Integrator", integrator)(instance_name="under_test")
     made._has_loader = True
     return made
@@ -128,7 +128,7 @@ def test_state_that_is_out_of_bounds_refuses_the_step(slave, state):
 
 @pytest.mark.parametrize("b", [nan, -inf])
 def test_outputs_that_are_not_finite_refuse_the_step(monkeypatch, tmp_path, b):
-    """Those that no input changes belong to the end of the step, of which they are a part."""
+    """Outputs without feedthrough belong to the end of the step and are computed in it."""
     own = imported(monkeypatch, tmp_path, ("Outputs(state.x)", "Outputs(state.x * BAD)"),
                    ("class Parameters", "BAD = 1.0\n\n\nclass Parameters"))  # fmt: skip
     slave = initialised(slave_of("Lag", own)(instance_name="under_test"))
@@ -139,7 +139,7 @@ def test_outputs_that_are_not_finite_refuse_the_step(monkeypatch, tmp_path, b):
     assert slave._get_fmu_state() == {**before, "fault": True}
 
 
-#: A lag whose output is all that has an input in it, and refuses some.
+#: A lag with an input only in its output, which refuses some of its values.
 SEEN = (
     ("def outputs(state: State)", "def outputs(state: State, inputs: Inputs)"),
     ("return Outputs(state.x)", "if inputs.u > 8.0:\n        raise Refusal('too far')\n"

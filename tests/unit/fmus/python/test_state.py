@@ -50,7 +50,7 @@ def with_generator(place: int, value: Any) -> Callable[[Snapshot], Any]:
     return change
 
 
-#: Of AuvPlant: key of the state, and what another value of it is made of.
+#: A key of the state of AuvPlant, and a function that gives another value for it.
 SPOILED = {
     "parameter out of range": ("parameters", with_parameter("m11", -25.0)),
     "parameter not finite": ("parameters", with_parameter("m11", nan)),
@@ -145,7 +145,7 @@ def test_state_with_a_part_missing_is_refused(driver):
 
 @given(place=st.integers(0), byte=st.integers(0, 255))
 def test_no_changed_byte_of_a_state_is_overlooked(place, byte):
-    """What is accepted is the same state, written in another way; what is not changes nothing."""
+    """An accepted state is the same, written in another way; a refused one changes nothing."""
     driver = ClassInstance("ObserverController")
     driver.excite(1)
     driver.step()
@@ -157,6 +157,63 @@ def test_no_changed_byte_of_a_state_is_overlooked(place, byte):
     assert driver.slave._get_fmu_state() == saved
 
 
+#: Values that stand for something else in a state.
+ODD = (
+    nan, inf, -inf, 1e308, -1e308, 1e-320, -0.0, 0, 1, -1, 2**31, 10**400, "", "bogus", "\ud800",
+    True, None, [], {}, [[]], [0.0], "stepping", "terminated", "instantiated", "initialising",
+)  # fmt: skip
+
+
+def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """The path of every value in a state."""
+    keys = (
+        value if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else ()
+    )
+    return [
+        *([path] if path else []),
+        *(p for key in keys for p in places(value[key], (*path, key))),
+    ]
+
+
+@given(name=st.sampled_from(REPRESENTATIVES), data=st.data())
+def test_changed_state_is_refused_as_a_whole_or_continues(name: str, data: st.DataObject):
+    """The checksum counts as right, so only the values can be wrong."""
+    driver = ClassInstance(name)
+    driver.excite(1)
+    driver.step()
+    before = driver.slave._get_fmu_state()
+    state = json.loads(json.dumps(before))
+    # Every part as often as any other, however large it is.
+    top = data.draw(st.sampled_from([*state]))
+    *path, last = data.draw(st.sampled_from([(top, *p) for p in [(), *places(state[top])]]))
+    part = state
+    for key in path:
+        part = part[key]
+    part[last] = data.draw(st.sampled_from(ODD))
+    driver.slave._set_fmu_state(state)
+    if driver.answers():
+        assert driver.answers() == [Fmi2Status.error]
+        assert driver.slave._get_fmu_state() == before
+    else:
+        driver.slave.do_step(state["time"], 0.02)
+        assert all(map(isfinite, driver.outputs()))
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"start_time": 10**400},
+        {"mode": "initialising"},
+        {"mode": "instantiated", "state": None, "outputs": []},
+    ],
+)
+def test_state_that_was_taken_once_is_refused(driver, change):
+    driver.step()
+    saved = driver.slave._get_fmu_state()
+    driver.slave._set_fmu_state({**saved, **change})
+    assert driver.answers() == [Fmi2Status.error]
+
+
 def test_state_that_is_not_fit_for_bytes_says_so():
     driver = ClassInstance("AuvPlant")
     content = driver.slave._fmu_state_to_bytes({"generator": object()})
@@ -164,7 +221,7 @@ def test_state_that_is_not_fit_for_bytes_says_so():
     assert "JSON" in driver.messages()[0]
 
 
-def test_text_of_a_state_is_no_trap_for_the_message(driver):
+def test_text_of_a_state_does_not_break_the_message(driver):
     saved = driver.slave._fmu_state_from_bytes(b'{"unusable": "%s' + b"x" * 10_000 + b'"}')
     driver.slave._set_fmu_state(saved)
     [message] = driver.messages()
@@ -172,7 +229,7 @@ def test_text_of_a_state_is_no_trap_for_the_message(driver):
     assert len(message) < 600
 
 
-#: What is not in the paper, in a run of AuvPlant.
+#: Additions to the paper, in a run of AuvPlant.
 ADDITIONS = {"roll": False, "current__x": 0.3, "actuator__T__u": 0.2, "actuator__T__q": 1e-3}
 
 
@@ -197,7 +254,7 @@ def test_state_that_rolls_is_none_of_a_vehicle_that_does_not():
     assert "its roll, which is held at zero, is not zero" in other.messages()[0]
 
 
-def test_state_whose_initialisation_was_refused_is_one_of_an_instance_that_can_go_on():
+def test_state_after_a_refused_initialisation_can_be_restored():
     driver = ClassInstance("AuvPlant", nu0__p=1e160)
     saved = driver.slave._fmu_state_from_bytes(
         driver.slave._fmu_state_to_bytes(driver.slave._get_fmu_state())
@@ -275,7 +332,7 @@ def test_json_gives_a_state_back():
         (bool, 1, "1 is not of type bool"),
     ],
 )
-def test_what_is_of_another_shape_is_refused(kind, value, why):
+def test_values_of_another_shape_are_refused(kind, value, why):
     with pytest.raises(Refusal) as refusal:
         restored(kind, value)
     assert str(refusal.value) == why
@@ -301,7 +358,7 @@ class Typed(NamedTuple):
 TYPED = Typed(-3, Colour.BLUE, Vector((3.0, 0.0)), Matrix(((0.0, 4.0),)))
 
 
-def test_size_is_that_of_vectors_and_matrices_too_and_of_no_integer():
+def test_size_includes_vectors_and_matrices_and_no_integers():
     assert measuring(Typed)(TYPED) == 25.0
 
 

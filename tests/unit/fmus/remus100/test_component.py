@@ -1,4 +1,4 @@
-"""Remus100: hulls that are none, states that no run leads to, and inputs that nothing feeds."""
+"""Remus100: impossible hulls, impossible states, and inputs without a source."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is looked at before an instance is made, on folders without a library."""
+"""The checks before an instance is made, on folders without a library."""
 
 from __future__ import annotations
 
