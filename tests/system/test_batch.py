@@ -41,9 +41,6 @@ KIND = "native"
 
 ORDERS = ("feedthrough", "jacobi")
 
-#: How many runs of each study are tried, and how many steps of each.
-SAMPLES, STEPS = 40, 40
-
 
 @cache
 def systems(*names: str) -> dict[str, System]:
@@ -64,12 +61,12 @@ def engines(*names: str, own: tuple[OwnIndex, ...] = ()) -> tuple[BatchEngine, F
 
 @cache
 def sampled(name: str) -> list[Point]:
-    """Some runs of a ready study, cut short, every second one in the other order."""
+    """Ten runs of a ready study, 40 steps each, every second one in the other order."""
     study = read_study(name)
     space = Space(study, {scenario: load_scenario(scenario, KIND) for scenario in study.scenario})
-    numbers = Random(name).sample(range(len(space)), SAMPLES)
+    numbers = Random(name).sample(range(len(space)), 10)
     return [
-        space[number]._replace(stop_time=STEPS * space[number].step, order=ORDERS[i % len(ORDERS)])
+        space[number]._replace(stop_time=40 * space[number].step, order=ORDERS[i % len(ORDERS)])
         for i, number in enumerate(numbers)
     ]
 
@@ -120,10 +117,12 @@ NOISY = {"plant.noise.std": 0.002, "plant.noise.seed": 5}
 PLANTS_FIRST: Order = ("plant", "disturbance", "planner", "controller")
 
 
-@pytest.mark.parametrize("order", [*ORDERS, None])
-@pytest.mark.parametrize("name", ["fig4", "fig5-pd", "path", "sea", "remus", "remus-pd"])
+@pytest.mark.parametrize(
+    ("name", "order"), [("fig4", None), ("fig5-pd", "jacobi"), ("path", "feedthrough"),
+                        ("sea", None), ("remus", "jacobi"), ("remus-pd", "feedthrough")]
+)  # fmt: skip
 def test_every_column_is_that_of_the_fmus(name, order):
-    compare_with_fmus(name, Point(0, name, NOISY, 10.01, 0.02, order))
+    compare_with_fmus(name, Point(0, name, NOISY, 4.01, 0.02, order))
 
 
 @pytest.mark.parametrize(
@@ -131,17 +130,17 @@ def test_every_column_is_that_of_the_fmus(name, order):
 )
 def test_orders_are_those_of_the_fmus(order):
     """One engine makes runs of all orders. An exact observer shows the gain of the step before."""
-    for observer in ("euler", "exact"):
-        values = {**NOISY, "controller.observer": observer}
-        compare_with_fmus("fig5", Point(0, "fig5", values, 2.01, 0.02, order))
+    values = {**NOISY, "controller.observer": "exact"}
+    compare_with_fmus("fig5", Point(0, "fig5", values, 2.01, 0.02, order))
 
 
-@pytest.mark.parametrize("name", ["formation-v", "formation-change"])
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(
+    ("name", "order"), [("formation-v", "feedthrough"), ("formation-change", "jacobi")]
+)
 def test_fleets_are_those_of_the_fmus(name, order):
     """The smallest distance between vehicles is among the indices; a star means all of them."""
     values = {"auv*.plant.noise.std": 0.01, "auv2.plant.m11": 26.0, "auv3.controller.K1": (9, 9, 8)}
-    point = Point(0, name, values, 5.01, 0.02, order)
+    point = Point(0, name, values, 2.01, 0.02, order)
     compare_with_fmus(name, point)
     [outcome] = engines(name)[0].outcomes([point])
     assert outcome.indices["smallest_distance"] > 0.0
@@ -222,36 +221,28 @@ def test_a_controller_of_ones_own_is_that_of_its_fmu(workplace):
 
 #: Values that make a difference to how a loop is computed.
 ADDITIONS: list[tuple[str, dict[str, Any]]] = [
-    ("fig4", {"controller.saturation": "algebraic"}),
+    ("fig4", {"controller.saturation": "algebraic", "plant.current.x": 0.4}),
     ("fig4", {"controller.saturation": "arctan", "controller.observer": "exact"}),
     ("fig4", {"controller.observer": "integral", "controller.printed_jacobian": True}),
     (
         "fig4",
         {"controller.innovation_gate": 0.001, "plant.noise.std": 0.01, "plant.noise.seed": -7},
     ),
-    ("fig4", {"plant.roll": False, "plant.noise.std": 0.001}),
-    ("fig4", {"plant.current.x": 0.4, "plant.current.z": -0.2}),
-    ("fig4", {"plant.actuator.T.u": 0.3, "plant.actuator.T.r": 0.05, "plant.tau_max.u": 20.0}),
-    ("fig4", {"plant.integrator": "rk4", "plant.current.y": 0.3, "plant.actuator.T.q": 0.1}),
-    ("fig4", {"plant.integrator": "rk4", "plant.roll": False, "plant.h_max": 0.01}),
+    ("fig4", {"plant.roll": False, "plant.actuator.T.u": 0.3, "plant.tau_max.u": 20.0}),
+    ("fig4", {"plant.integrator": "rk4", "plant.current.y": 0.3, "plant.h_max": 0.004}),
     ("fig4", {"planner.nu0.u": 0.2, "planner.h_max": 0.003, "controller.h_max": 0.007}),
-    ("fig4", {"plant.ell": 0.5, "plant.h_max": 0.004, "planner.m11": 20.0}),
     ("path", {"planner.cruise": 0.4, "planner.rounding": 40.0, "plant.water.y": 0.1}),
-    ("path", {"planner.timed": True, "planner.count": 4, "planner.waypoint[1].t": 0.01}),
-    ("path", {"plant.dwater.x": 0.1}),
+    ("path", {"planner.timed": True, "planner.waypoint[1].t": 0.01, "plant.dwater.x": 0.1}),
     ("sea", {"sea.waves.spectrum": "none", "sea.current.mu": 0.5, "sea.current.root": 0.0}),
-    ("sea", {"sea.waves.count": 64, "sea.waves.s": 0.0, "sea.depth": 6.0, "sea.waves.Hs": 0.5}),
-    ("sea", {"plant.integrator": "rk4", "plant.current.z": 0.1, "plant.h_max": 0.007}),
-    ("sea", {"plant.roll": False, "plant.actuator.T.u": 0.2, "sea.waves.seed": -3}),
-    ("remus", {"plant.h_max": 0.004, "plant.water.x": 0.3, "plant.current.y": -0.1}),
+    ("sea", {"sea.waves.count": 64, "sea.depth": 6.0, "sea.waves.seed": -3, "plant.roll": False}),
+    ("remus", {"plant.h_max": 0.004, "plant.water.x": 0.3, "disturbance.nu.r": 0.1}),
     ("remus", {"allocation.measured": True, "plant.r_bg.y": 0.001, "plant.fin.T": 0.0}),
-    ("remus", {"disturbance.nu.r": 0.1}),
 ]
 
 
-@pytest.mark.parametrize(("of", "order"), zip(ADDITIONS, cycle(ORDERS), strict=False))
-def test_additions_are_those_of_the_fmus(of, order):
-    name, values = of
+@pytest.mark.parametrize(("addition", "order"), zip(ADDITIONS, cycle(ORDERS), strict=False))
+def test_additions_are_those_of_the_fmus(addition, order):
+    name, values = addition
     compare_with_fmus(name, Point(0, name, values, 2.01, 0.02, order))
 
 
@@ -263,31 +254,21 @@ MISTAKES: list[tuple[str, dict[str, Any]]] = [
     ("fig4", {"controller.gamma": -1.0}),
     ("fig4", {"plant.tau_min.u": 0.0, "plant.tau_max.u": 0.0, "planner.eta0.theta": 1.6}),
     ("fig4", {"plant.roll": False, "plant.nu0.p": 0.1}),
-    ("fig4", {"plant.eta0.x": 1e101}),
     ("fig4", {"plant.ell": 1e308}),
     ("fig4", {"plant.h_max": 1e-9, "controller.h_max": 1e-9}),
     ("fig4", {"planner.tau_d.q": 40.0}),
     ("fig4", {"plant.m11": 1e-9}),
-    ("fig4", {"plant.m66": 1e-3, "planner.tau_d.q": 50.0}),
     ("fig4", {"disturbance.omega_d": 1e308}),
-    ("fig4", {"disturbance.A_d": 1.7e308, "disturbance.A_f": 1.7e308}),
-    ("fig4", {"controller.gamma": 1e200}),
-    ("path", {"planner.cruise": 2.0, "planner.rounding": 0.5}),
     ("path", {"planner.timed": True, "planner.waypoint[3].t": 1.0}),
-    ("path", {"planner.ell": 1e308}),
     ("sea", {"sea.waves.Hs": 20.0}),
-    ("sea", {"sea.current.sigma": 1e200}),
-    ("sea", {"plant.m11": 1e-9}),
     ("remus", {"plant.nu0.u": 11.0}),
-    ("remus", {"plant.diameter": 1.5}),
     ("remus", {"plant.drag.T.yaw": 1e-3}),
-    ("remus", {"plant.current.x": 9.9, "controller.gamma": 1e200}),
 ]
 
 
-@pytest.mark.parametrize(("of", "order"), zip(MISTAKES, cycle(ORDERS), strict=False))
-def test_what_fmus_refuse_is_refused(of, order):
-    name, values = of
+@pytest.mark.parametrize(("mistake", "order"), zip(MISTAKES, cycle(ORDERS), strict=False))
+def test_what_fmus_refuse_is_refused(mistake, order):
+    name, values = mistake
     point = Point(5, name, values, 3.0, 0.02, order)
     [[one], [other]] = (engine.outcomes([point]) for engine in engines(name))
     assert other.failure
@@ -349,7 +330,6 @@ def test_what_a_loop_would_never_end_with_is_refused_before(workplace):
         '[wires]\n"scaled.x" = "planner.y_d.x"\n"halved.x" = "scaled.y"\n'
     )
     path = str(Path("own.toml").resolve())
-    compare_with_fmus(path, Point(0, "", {}, 4.01, 0.02, "jacobi"))
     # The reference comes beyond x = 1.1 m after 5.4 s.
     point = Point(0, path, {"scaled.k": 1.7e308}, 20.0, 0.02, "jacobi")
     assert [*BatchEngine({path: load(path, KIND)}).outcomes([point])] == [(0, {}, REFUSED, None)]
@@ -357,18 +337,17 @@ def test_what_a_loop_would_never_end_with_is_refused_before(workplace):
 
 def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    values = {"planner.tau_d.q": [1.0, 40.0, 45.0], "plant.noise.std": [0.0, 0.001]}
-    study = {"scenario": "fig4", "stop_time": 3.0, "vary": values}
+    study = {"scenario": "fig4", "stop_time": 3.0, "vary": {"planner.tau_d.q": [1.0, 40.0, 45.0]}}
     one, other = (
         sweep(study, engine=engine, kind=KIND, workers=1, out=tmp_path / engine)
         for engine in ("batch", "fmu")
     )
     assert list(one) == list(other)
-    assert [*one["failure"][:2]] == [None, None]
-    assert all("SteepReference" in failure for failure in one["failure"][2:])
+    assert one["failure"][0] is None
+    assert all("SteepReference" in failure for failure in one["failure"][1:])
     for name in one:
         assert str(one[name].tolist()) == str(other[name].tolist()), name
-    assert (one.failed, one.cautions) == (4, other.cautions)
+    assert (one.failed, one.cautions) == (2, other.cautions)
 
 
 @pytest.mark.parametrize(
@@ -398,17 +377,16 @@ def test_an_fmu_of_another_tool_is_refused_by_name(tmp_path):
 @pytest.mark.parametrize("name", ["fig4", "formation-v"])
 def test_an_index_of_ones_own_is_that_of_the_fmus(name):
     own = (OwnIndex("largest_depth", Path(largest_depth.__file__).read_bytes()),)
-    run = Point(0, name, {}, 10.01, 0.02)
+    run = Point(0, name, {}, 2.01, 0.02)
     compare_with_fmus(name, run, own)
     [outcome] = engines(name, own=own)[0].outcomes([run])
     assert any(key.endswith("largest_depth") for key in outcome.indices)
 
 
-@pytest.mark.parametrize("name", ["fig4", "formation-v"])
-def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus(name):
+def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
     """Before its first run as after it, if its program is prepared."""
-    batch = BatchEngine(systems(name))
-    run = Point(0, name, {}, 0.5, 0.02)
+    batch = BatchEngine(systems("fig4"))
+    run = Point(0, "fig4", {}, 0.5, 0.02)
     batch.prepare(run)
     copies = [pickle.loads(pickle.dumps(batch))]
     [outcome] = batch.outcomes([run])
@@ -422,22 +400,11 @@ def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus(name):
 
 def test_threads_have_noise_of_their_own():
     batch, _ = engines("fig4")
-    runs = [Point(i, "fig4", {"plant.noise.seed": i}, 5.0, 0.02) for i in range(20)]
+    runs = [Point(i, "fig4", {"plant.noise.seed": i}, 2.0, 0.02) for i in range(12)]
     with ThreadPoolExecutor(4) as pool:
         side_by_side = list(pool.map(lambda run: next(batch.outcomes([run])), runs))
     assert side_by_side == list(batch.outcomes(runs))
     assert len({outcome.indices["late_error"] for outcome in side_by_side}) == len(runs)
-
-
-def test_threads_make_a_study_that_one_makes(tmp_path):
-    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    starts = {"from": -5.0, "to": 5.0, "n": 40}
-    study = {"scenario": "fig5", "stop_time": 5.0, "vary": {"plant.eta0.y": starts}}
-    one, four = (
-        sweep(study, engine="batch", workers=n, out=tmp_path / str(n)).to_dataframe()
-        for n in (1, 4)
-    )
-    assert one.equals(four)
 
 
 def test_another_process_finds_the_program_compiled(tmp_path):
