@@ -121,6 +121,7 @@ def test_wheel_with_all_ready_runs_fig4_without_a_compiler_and_builds_nothing(
         assert not (cache / "auv-fmu" / category).exists()
 
 
+@pytest.mark.slow
 def test_bundle_built_again_elsewhere_is_the_same_to_the_last_byte(dist: Path, tmp_path: Path):
     bundle.build_bundle(tmp_path / "elsewhere")
     kept = {name: text for name, text in contents(dist).items() if not name.startswith(".")}

@@ -20,7 +20,6 @@ from support.live import needs_npm
 from support.pages import stored
 
 OTHER = Loop("tow", "pilot", "guide", "sea")
-STOP = "6"
 
 #: What the second vehicle has otherwise, by the name that its component has when it is alone.
 CHANGES = {
@@ -61,7 +60,7 @@ def results(tmp_path_factory):
     alone = scenario(folder / "one.toml", {}, {}, CHANGES)
     for name in (both, alone, "fig4"):
         out = str(folder / Path(name).stem)
-        run = ["run", str(name), "--kind", "native", "--stop-time", STOP, "--out", out]
+        run = ["run", str(name), "--kind", "native", "--stop-time", "2", "--out", out]
         assert main([*run, *(["--no-figures"] if name != both else [])]) == 0
     return folder
 
@@ -71,10 +70,6 @@ def test_loops_are_found_by_ports_and_wires(results):
     assert loops_of(load("fig5-pd", "native")) == (STANDARD,)
     # Alone, what it lacks has the standard name.
     assert loops_of(load("fig3a", "native")) == (STANDARD,)
-
-
-def test_names_of_the_standard_loop_are_those_of_its_file():
-    assert set(filter(None, vars(STANDARD).values())) == set(read_wiring()["components"])
 
 
 @pytest.mark.parametrize(("alone", "name"), [("fig4", "plant"), ("one", "tow")])
@@ -137,11 +132,9 @@ def test_all_vehicles_are_on_one_page(results, capsys):
     assert [vehicle["name"] for vehicle in loop["vehicles"]] == ["plant", "tow"]
 
 
-def test_theorem_and_indices_are_said_of_each(results, capsys):
+def test_theorem_is_said_of_each(results):
     text = gain_check(load(results / "two.toml", "native"))
     assert text.startswith("plant:\n") and "\ntow:\n" in text
-    result = simulate(results / "two.toml", stop_time=1.0, kind="native")
-    assert result.metrics()[VEHICLES].keys() == {"plant", "tow"}
 
 
 def test_a_study_has_columns_of_each(results, tmp_path):
@@ -149,7 +142,7 @@ def test_a_study_has_columns_of_each(results, tmp_path):
     from orchestrator import sweep  # noqa: PLC0415
 
     study = {
-        "scenario": str(results / "two.toml"), "stop_time": 2.0,
+        "scenario": str(results / "two.toml"), "stop_time": 0.2,
         "vary": {"pilot.eps_t": [10.0, 30.0]},
     }  # fmt: skip
     result = sweep(study, kind="native", out=tmp_path / "s", workers=1)
@@ -163,10 +156,9 @@ def test_a_study_has_columns_of_each(results, tmp_path):
 # Vehicles that a scenario counts
 
 
-@pytest.mark.parametrize("kind", ["native", "python"])
-def test_one_vehicle_of_a_fleet_has_the_numbers_of_the_single_loop(kind):
-    single = simulate("fig4", stop_time=2.0, kind=kind)
-    of_fleet = simulate({"vehicles": 1}, stop_time=2.0, kind=kind)
+def test_one_vehicle_of_a_fleet_has_the_numbers_of_the_single_loop():
+    single = simulate("fig4", stop_time=1.0, kind="native")
+    of_fleet = simulate({"vehicles": 1}, stop_time=1.0, kind="native")
     assert of_fleet.columns == tuple(f"auv1.{name}" for name in single.columns)
     assert (of_fleet.rows == single.rows).all()
 
@@ -183,7 +175,7 @@ def test_each_vehicle_of_a_fleet_has_the_numbers_that_it_has_alone():
 FLEET = """
 vehicles = 3
 figure = "comparison"
-stop_time = 2.0
+stop_time = 1.5
 
 [components]
 lead = "MotionPlanner"
@@ -203,7 +195,7 @@ components."auv*.controller" = "PdController"
 wires."auv*.controller.dy" = "auv*.plant.dy"
 
 [[events]]
-at = 1.0
+at = 0.5
 override = { "auv*.controller.tau.u" = 0.0 }
 """
 
@@ -244,7 +236,7 @@ def test_a_fleet_is_compared_with_another_controller_in_its_place(fleet, tmp_pat
         for folder in (tmp_path, tmp_path / "fleet-pd")
     ]
     for table in tables:
-        is_after = table["time"] > 1.01
+        is_after = table["time"] > 0.51
         for number in (1, 2, 3):
             assert (table[f"auv{number}.plant.tau.u"][is_after] == 0.0).all()
         # Rows of positions of three vehicles, taken apart without the code under test.
