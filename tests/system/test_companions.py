@@ -15,7 +15,6 @@ from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.vehicle.signals import STANDARD
-from support.markdown import DOCS, blocks
 from support.runs import PD
 from support.texts import mentions
 
@@ -41,7 +40,6 @@ def runs_of(text, stop_time=1.0):
 @pytest.mark.parametrize(
     "text",
     [
-        PD,
         "[parameters]\nplanner.eta0.z = -10.0\n" + PD,
         '[components]\nplanner = "PathPlanner"\n[path]\nfile = "path.csv"\n' + PD,
         "[steps]\nplanner = 0.1\n" + PD,
@@ -52,13 +50,6 @@ def test_both_follow_the_reference_of_the_scenario(workplace, text):
     ours, theirs = runs_of(text)
     assert np.array_equal(ours.group(*STANDARD.y_d), theirs.group(*STANDARD.y_d))
     assert not np.array_equal(ours["plant.eta.x"], theirs["plant.eta.x"])
-
-
-def test_both_follow_the_same_reference_in_the_example_of_the_guide(workplace):
-    example = next(block.text for block in blocks(DOCS / "how-to" / "events.md", "toml"))
-    ours, theirs = runs_of(example.replace("stop_time = 40.0\n", ""), 12.0)
-    assert ours["planner.y_d.z"][0] == -2.0
-    assert np.array_equal(ours.group(*STANDARD.y_d), theirs.group(*STANDARD.y_d))
 
 
 def test_only_what_is_said_differs(workplace):
@@ -113,20 +104,11 @@ def test_wires_are_removed_whoever_has_stated_them(workplace):
     }
 
 
-def test_what_is_compared_may_be_anything(workplace):
-    heavy, light = runs_of('compare = { name = "light", parameters.plant.m11 = 20.0 }\n')
-    assert abs(heavy["plant.nu.u"][-1]) < abs(light["plant.nu.u"][-1])
-
-
 def test_references_that_differ_are_said(workplace, capsys):
     Path("mine.toml").write_text("stop_time = 1.0\n" + PD + "parameters.planner.tau_d.u = 3.0\n")
     assert main(["run", "mine.toml", "--no-figures", "--kind", "native"]) == 0
     said = capsys.readouterr().err
     assert mentions(said, "pd: reference planner.y_d mine")
-    for name in ("fig5", "path"):
-        assert read_scenario(name).compare
-        assert main(["run", name, "--stop-time", "1", "--no-figures", "--kind", "native"]) == 0
-        assert "its reference" not in capsys.readouterr().err
 
 
 COMPARED = [name for name in names() if read_scenario(name).compare]
@@ -160,15 +142,3 @@ def test_scenarios_of_the_pd_controller_are_the_companions(name):
     _, companion = with_companion(prepare(*load_scenario(name, "native"), request), request)
     own = prepare(*load_scenario(f"{name}-pd", "native"), request)
     assert own.identity == companion.identity
-
-
-def test_the_name_of_a_scenario_is_no_longer_a_comparison(workplace, capsys):
-    Path("mine.toml").write_text('compare = "fig5-pd"\n')
-    assert main(["run", "mine.toml"]) == 2
-    [line] = capsys.readouterr().err.splitlines()
-    written = line[line.index("{") : line.rindex("}") + 1]
-    Path("mine.toml").write_text(f"compare = {written}\n")
-    assert [one.scenario.name for one in pair_of(Path("mine.toml").read_text())] == [
-        "mine",
-        "mine-pd",
-    ]
