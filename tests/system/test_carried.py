@@ -329,9 +329,12 @@ def test_option_of_tables_is_refused(tmp_path: Path, refused, option: str):
     assert option.partition("=")[0] in refused("verify", fmu, option)
 
 
-@pytest.mark.parametrize("name", components())
-def test_our_fmus_prove_themselves(dist3: Path, name: str, capsys):
-    assert main(["verify", str(dist3 / f"{name}.fmu")]) == 0
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [("dist", "AuvPlant"), ("native", "AuvPlant"), *(("dist3", name) for name in components())],
+)
+def test_our_fmus_prove_themselves(request: pytest.FixtureRequest, kind: str, name: str, capsys):
+    assert main(["verify", str(request.getfixturevalue(kind) / f"{name}.fmu")]) == 0
     verdicts = [line for line in capsys.readouterr().out.splitlines() if " outputs agree " in line]
     folder = source_of(name).folder / REFERENCE
     assert len(verdicts) == 1 + len([*folder.glob("*.ssv")])

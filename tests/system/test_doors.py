@@ -131,15 +131,11 @@ def test_what_is_written_for_libcosim_is_read_again(dist: Path, tmp_path: Path):
         ("VariableConnection>", "VariableGroupConnection>", "<VariableGroupConnection> 2"),
         ('name="in"/>', 'name="into"/>', "scaled: 0"),
         ('function="scaled" name="in"', 'function="scale" name="in"', "'scale'"),
-        ('simulator="c" name="v"', 'simulator="c" name="w"', "c 'w'"),
         ('simulator="b" name="y"', 'simulator="d" name="y"', "'d'"),
         ('<Real value="0.7"/>', '<Real value="much"/>', "a.v much"),
-        ('<Real value="0.7"/>', "", "a.v: value"),
         ('name="b" source', 'name="a" source', "two a"),
-        ('source="relay.fmu" stepSize', 'source="none.fmu" stepSize', "'none.fmu' b"),
         ('"../fmus/relay%20one.fmu"', '"proxyfmu://host?file=x.fmu"', "'proxyfmu://host?file=x"),
         (f"<BaseStepSize>{STEP}<", "<BaseStepSize>fast<", "BaseStepSize 'fast'"),
-        ("<OspSystemStructure ", "<OspSystem ", "tag"),
     ],
 )  # fmt: skip
 def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, why):
@@ -150,16 +146,13 @@ def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, 
     assert mentions(str(error.value), why) and "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "why"),
-    [
-        ("fixedStep", "ecco", "'ecco'"),
-        (f'"{2 * STEP}"', f'"{2.03 * STEP}"', "b: .* 0.25375 s .* 0.25 s"),
-    ],
-)
-def test_what_of_an_osp_file_changes_is_a_warning(osp: Path, old, new, why):
-    (osp / OSP_STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
-    with pytest.warns(UserWarning, match=why):
+def test_what_of_an_osp_file_changes_is_a_warning(osp: Path):
+    text = OSP.replace("fixedStep", "ecco").replace(f'"{2 * STEP}"', f'"{2.03 * STEP}"')
+    (osp / OSP_STRUCTURE).write_text(text, encoding="utf-8")
+    with (
+        pytest.warns(UserWarning, match="'ecco'"),
+        pytest.warns(UserWarning, match=r"b: .* 0.25375 s .* 0.25 s"),
+    ):
         assert load(osp).steps["b"] == 2 * STEP
 
 
@@ -211,7 +204,7 @@ def test_export_names_the_values_that_other_tools_may_leave_out(
     assert mentions(line, f"m.p2 {kind} {tools}") and "p1" not in line
 
 
-@pytest.mark.parametrize("name", ["", "SystemStructure.ssd", "Winter.ssd"])
+@pytest.mark.parametrize("name", ["", "Winter.ssd"])
 def test_an_unpacked_ssp_is_what_the_archive_is(tmp_path: Path, name: str):
     relay(tmp_path)
     twice = described(system(component("a") + component("b")))
@@ -239,21 +232,14 @@ def test_a_folder_runs_from_within_and_may_lack_a_stop_time(workplace: Path, cap
     assert Path("results/result.csv").read_text().count("\n") > 10
 
 
-def test_a_scenario_wins_over_a_folder_of_its_name(dist: Path, workplace: Path):
-    Path("fig4").mkdir()
-    assert "plant" in load("fig4").components
-
-
 @pytest.mark.parametrize(
     ("name", "why"),
     [
         ("mine.mo", ".toml .ssp .ssd .fmu OspSystemStructure.xml"),
         ("empty", "empty: SystemStructure.ssd"),
         ("none.ssd", "none.ssd"),
-        ("none.xml", "none.xml:"),
         ("other.xml", "OspSystemStructure.xml <other>"),
         ("text.xml", "OspSystemStructure.xml: syntax"),
-        ("none.fmu", "none.fmu:"),
     ],
 )
 def test_what_is_none_of_these_is_refused_in_one_line(workplace: Path, capsys, name, why):
@@ -312,9 +298,7 @@ def test_a_scenario_wires_single_ports_beside_groups(dist: Path, wired: Path):
     ("wire", "why"),
     [
         ('"g.u" = "t.out"', "g.u t 'out' out.a out.b"),
-        ('"g.u" = "t.yy"', "g.u t 'yy' y?"),
-        ('"x.in" = "t.one"', "t.one x.in "
-         "in.a in.b?"),
+        ('"x.in" = "t.one"', "t.one x.in in.a in.b?"),
         ('"g.sped" = "t.y"', "g sped sped.* speed?"),
         ('"g.u" = "tt.y"', "'tt' t?"),
         ('"t.y" = "g.u"', "g.u input output"),

@@ -43,9 +43,8 @@ def with_values(system, values):
 
 
 @EVERY_WAY
-@pytest.mark.parametrize("peculiarity", ["", "RESETS"])
-def test_parameters_last_also_where_initialisation_resets_them(tmp_path, peculiarity, way):
-    system = with_values(system_of(build(tmp_path, peculiarity)), {"gain": 3.0, "u": 2.0})
+def test_parameters_last_also_where_initialisation_resets_them(tmp_path, way):
+    system = with_values(system_of(build(tmp_path, "RESETS")), {"gain": 3.0, "u": 2.0})
     table = run(system, **way)
     assert (table["a.y"] == 6.0).all()
     assert table.parameters[PortName("a", "gain")] == 3.0
@@ -240,7 +239,7 @@ def test_a_library_of_another_name_is_named(tmp_path: Path):
 
 
 @pytest.mark.parametrize("way", [WAYS["python"], WAYS["isolated"]])
-@pytest.mark.parametrize("share", [0.02, 0.5, 0.999])
+@pytest.mark.parametrize("share", [0.02, 0.999])
 def test_a_library_cut_short_is_refused_before_it_is_loaded(tmp_path, capsys, share, way):
     """The system would end the process that reads what is not there."""
     cut = tmp_path / "cut.fmu"
@@ -302,14 +301,10 @@ def test_the_mode_of_who_simulates_is_left_as_it_was(tmp_path):
     [
         ('factor="1000"', 'factor="1_000"', "factor .*<BaseUnit> .*'1_000'"),
         ('m="1"', 'm="\N{ARABIC-INDIC DIGIT ONE}"', "m of <BaseUnit> is '.'"),
-        ('m="1"', 'm="1_0"', "m of <BaseUnit> is '1_0'"),
         ('name="storm" value="4"', 'name="storm" value="4_0"', "value of <Item> is '4_0'"),
-        ('<Real start="1"/>', '<Real start="1" max="1_0"/>', "max of <Real> is '1_0'"),
         ('<Real start="1"/>', '<Real start="1" min="much"/>', "min of <Real> is 'much'"),
         ('valueReference="4"', 'valueReference="0_4"', "valueReference of <ScalarVariable>"),
-        ('index="11"', 'index="1_1"', "index of <Unknown> is '1_1'"),
         ('name="storm" value="4"', 'name="storm"', "<Item> .*value"),
-        ('name="storm" value="4"', 'value="4"', "<Item> .*name"),
         ('name="storm" value="4"', 'name="storm" value="1.5"', "value of <Item> .*'1.5'"),
     ],
 )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,7 +14,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fmus.kinds import NATIVE
-from orchestrator.commands.main import main
 from orchestrator.cosim import (
     Alter,
     Event,
@@ -78,7 +76,7 @@ def same(system: System, experiment: Experiment, events: Sequence[Event] = ()) -
     return python
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(
     arguments=systems(),
     step=st.floats(1e-3, 1.0),
@@ -94,7 +92,7 @@ def test_random_systems_give_the_same_rows_and_the_same_failures(
         same(system_of(folder, **arguments), Experiment((n + rest) * step, step, order))
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(data=st.data(), arguments=systems(), order=st.sampled_from(ANY))
 def test_values_of_any_size_on_their_ways_give_the_same_rows_and_the_same_failures(
     folder, data, arguments, order
@@ -111,9 +109,8 @@ def test_values_of_any_size_on_their_ways_give_the_same_rows_and_the_same_failur
 
 
 @pytest.mark.parametrize("order", ANY)
-@pytest.mark.parametrize("step", [0.02, 0.03])
-def test_the_bundle_gives_the_same_rows(dist: Path, order: str, step: float):
-    assert len(same(closed_loop(dist), Experiment(20.0, step, order))) > 600
+def test_the_bundle_gives_the_same_rows(dist: Path, order: str):
+    assert len(same(closed_loop(dist), Experiment(5.0, 0.03, order))) > 160
 
 
 #: A component that feeds another one, by which it is fed.
@@ -138,21 +135,12 @@ def pair(folder: Path, act: str, call: str = "STEP", milliseconds: int = 0) -> S
     ("act", "call", "rows", "words"),
     [
         ("DISCARD", "SET", 8, "3.5 s: bad: inputs 2 discard"),
-        ("DISCARD", "STEP", 7, "3 s: bad: doStep 2 discard"),
         ("DISCARD", "GET", 7, "3 s: bad: outputs 2 discard"),
         ("FAIL", "STEP", 7, "3 s: bad: doStep 3 error"),
-        *(
-            (act, call, rows, f"{name} {status} illegal")
-            for act, status in (("BELOW_ALL", -1), ("BEYOND_ALL", 6))
-            for call, rows, name in (
-                ("SET", 8, "3.5 s: bad: inputs"),
-                ("STEP", 7, "3 s: bad: doStep"),
-                ("GET", 7, "3 s: bad: outputs"),
-            )
-        ),
-        ("FATAL", "SET", 8, "3.5 s: bad: inputs 4 fatal"),
+        ("BELOW_ALL", "SET", 8, "3.5 s: bad: inputs -1 illegal"),
+        ("BEYOND_ALL", "STEP", 7, "3 s: bad: doStep 6 illegal"),
+        ("BEYOND_ALL", "GET", 7, "3 s: bad: outputs 6 illegal"),
         ("FATAL", "STEP", 7, "3 s: bad: doStep 4 fatal"),
-        ("FATAL", "GET", 7, "3 s: bad: outputs 4 fatal"),
         ("SAYS", "STEP", 7, "3 s: bad: tired"),
         ("NOT_A_NUMBER", "STEP", 7, "3.5 s: bad.output.Real0 nan"),
         ("INFINITE", "STEP", 7, "3.5 s: bad.output.Real0 inf"),
@@ -222,15 +210,10 @@ def test_the_mode_of_an_fmu_changes_no_number_of_the_others(folder, loop, order,
     ]
     there = replace(there, connections=tuple(wires))
     behaves = there.with_parameters({PortName("bad", "act"): ACTS["BEHAVE"]})
-    experiment = Experiment(100.0, 0.1, order)
+    experiment = Experiment(10.0, 0.1, order)
     found, expected = (run(system, experiment, loop) for system in (there, behaves))
     assert found.rows.tobytes() == expected.rows.tobytes()
-    assert len(found) == 1001
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-def test_a_warning_is_no_failure(folder, loop):
-    assert len(run(pair(folder, "WARN"), Experiment(100.0, H), loop)) == 201
+    assert len(found) == 101
 
 
 @pytest.mark.parametrize("loop", LOOPS)
@@ -280,13 +263,6 @@ def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
     )
     assert 1000 < len(full) < len(whole) < 2001
     assert np.array_equal(whole.time, np.arange(len(whole)) * H)
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-def test_the_record_says_which_loop_has_run(workplace, loop):
-    options = ["--stop-time", "0.1", "--no-figures", "--out", "r", "--loop", loop]
-    assert main(["run", "fig4", *options]) == 0
-    assert json.loads(Path("r/run.json").read_text())["loop"] == loop
 
 
 class Pushes:
