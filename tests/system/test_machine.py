@@ -29,7 +29,6 @@ from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.result import read_result
 from orchestrator.runs.tables import read_rows
 from support.machine import (
-    LOOPS,
     called,
     contents,
     eventually,
@@ -64,14 +63,12 @@ def failure(folder: Path) -> str:
 RUN = ["run", "fig4", "--no-figures", "--stop-time"]
 
 
-@pytest.mark.parametrize(
-    ("ending", "loop"), [("csv", "python"), ("csv", "compiled"), ("parquet", "auto")]
-)
+@pytest.mark.parametrize(("ending", "loop"), [("csv", "python"), ("parquet", "compiled")])
 def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending, loop):
-    """There is room for some thousand of a million."""
+    """There is room for some of a million rows."""
     if ending == "parquet":
         pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
-    with small_disk(workplace / "disk", 14_000_000) as disk:
+    with small_disk(workplace / "disk", 3_000_000) as disk:
         out = ["--out", str(disk / "r"), "--format", ending, "--loop", loop]
         assert main([*RUN, "0.1", *out]) == 0
         before = contents(disk)
@@ -85,12 +82,12 @@ def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending
         incomplete = disk / "r" / "incomplete"
         assert {name: after[name] for name in after if "incomplete" not in name} == before
         kept = rows(incomplete, ending)
-        assert len(kept) > 1000
+        assert len(kept) > 100
         assert np.array_equal(kept, simulate("fig4", stop_time=(len(kept) - 1) * 0.02).rows)
         assert read_result(incomplete)[1].failure == why.removeprefix("auv-fmu: fig4 ")
 
 
-@pytest.mark.parametrize("size", [60_000, 150_000, 500_000, 900_000])
+@pytest.mark.parametrize("size", [60_000, 150_000, 900_000])
 def test_full_disk_at_any_stage(workplace, capsys, size):
     """The table takes 0.2 MB, figures another 0.9 MB."""
     with small_disk(workplace / "disk", size) as disk:
@@ -159,10 +156,9 @@ def test_limit_of_the_size_of_files_is_like_a_full_disk(workplace):
     assert len(kept) > 500
 
 
-@pytest.mark.parametrize("megabytes", [200, 235])
-def test_short_memory_is_said_and_loses_no_rows(workplace, megabytes):
+def test_short_memory_is_said_and_loses_no_rows(workplace):
     """Python and numpy alone need 150 MB of address space, figures 300."""
-    limit = {resource.RLIMIT_AS: megabytes * 10**6}
+    limit = {resource.RLIMIT_AS: 235 * 10**6}
     status, said = called("run", "fig4", "--stop-time", "1", limits=limit)
     assert status in (1, 2)
     assert not [line for line in said if "Traceback" in line]
@@ -221,10 +217,14 @@ def running(loop: str = "auto") -> subprocess.Popen[str]:
     return process
 
 
-@pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize(
-    "signals",
-    [[signal.SIGTERM], [signal.SIGHUP], [signal.SIGINT] * 5],
+    ("signals", "loop"),
+    [
+        ([signal.SIGTERM], "python"),
+        ([signal.SIGHUP], "compiled"),
+        ([signal.SIGINT] * 5, "python"),
+        ([signal.SIGINT] * 5, "compiled"),
+    ],
 )
 def test_signals_end_a_run_and_lose_nothing(workplace, temporary, signals, loop):
     process = running(loop)
@@ -277,9 +277,10 @@ class Hanging(Fmi2Slave):
 """
 
 
-@pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize(
-    "hang", ["pass", "import ctypes; ctypes.CDLL(None).poll(None, 0, -1)"], ids=["Python", "C"]
+    ("hang", "loop"),
+    [("pass", "python"), ("import ctypes; ctypes.CDLL(None).poll(None, 0, -1)", "compiled")],
+    ids=["Python", "C"],
 )
 def test_the_third_signal_ends_an_fmu_that_hangs_and_keeps_the_rows(workplace, hang, loop):
     Path("hanging.py").write_text(HANGING.format(hang=hang))
@@ -299,13 +300,13 @@ def test_the_third_signal_ends_an_fmu_that_hangs_and_keeps_the_rows(workplace, h
 
 
 def test_the_end_of_the_terminal_means_nothing_under_nohup(workplace):
-    process = start(*RUN, "5", before=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    process = start(*RUN, "2", before=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
     while process.poll() is None:
         process.send_signal(signal.SIGHUP)
         time.sleep(0.1)
     assert process.communicate()[1] == ""
     assert process.returncode == 0
-    assert len(rows(workplace / "results" / "fig4")) == 251
+    assert len(rows(workplace / "results" / "fig4")) == 101
 
 
 def busy(process: subprocess.Popen[str], temporary: Path) -> bool:
@@ -314,13 +315,7 @@ def busy(process: subprocess.Popen[str], temporary: Path) -> bool:
 
 
 @pytest.mark.parametrize(
-    ("command", "number"),
-    [
-        ("build", signal.SIGTERM),
-        ("build", signal.SIGKILL),
-        ("report", signal.SIGHUP),
-        ("report", signal.SIGKILL),
-    ],
+    ("command", "number"), [("build", signal.SIGKILL), ("report", signal.SIGHUP)]
 )
 def test_children_end_with_their_parent(workplace, temporary, command, number):
     """And what was good stays good, byte for byte; nothing stays but what the next one removes."""
@@ -359,7 +354,7 @@ def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
     assert rows(left)[0, 0] == 0.0
 
 
-@pytest.mark.parametrize("command", [["run", "fig4"], ["export", "fig4"], ["build"], ["report"]])
+@pytest.mark.parametrize("command", [["run", "fig4"], ["export", "fig4"], ["report"]])
 def test_a_folder_that_another_process_writes_into_is_left_alone(workplace, capsys, command):
     (workplace / "r").mkdir()
     with hold_lock(workplace / "r"):
@@ -368,10 +363,9 @@ def test_a_folder_that_another_process_writes_into_is_left_alone(workplace, caps
     assert contents(workplace) == {}
 
 
-@pytest.mark.parametrize("hours", [-1000, 1000])
-def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys, hours):
+def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys):
     """With the bar, which a terminal would show."""
-    jump = count(step=hours)
+    jump = count(step=-1000)
 
     class Jumping(datetime):
         @classmethod

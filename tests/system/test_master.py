@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd
-from fmpy.util import read_csv
 
 from orchestrator.cosim import (
     Connection,
@@ -33,9 +32,8 @@ from orchestrator.cosim.fmi.binary import check_place
 from orchestrator.cosim.stages import arrange
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
-from orchestrator.runs.tables import read_columns, read_rows
 from support.machine import LOOPS
-from support.runs import run, write
+from support.runs import run
 from support.texts import mentions
 from support.tiers import slow
 
@@ -61,7 +59,6 @@ def test_gauss_seidel_order_follows_the_declared_feedthrough(system: System):
     [
         ("plant.y.w", "controller.y.x", "'y.w' y.x"),
         ("plante.y.x", "controller.y.x", "'plante' plant, controller"),
-        ("plant.y.x", "controller.yx", "'yx'"),
         ("plant.tau.u", "controller.y.x", "plant.tau.u input output"),
         ("plant.y.x", "controller.e.x", "controller.e.x output input"),
         ("plant.fault", "controller.y.x", "Boolean Real"),
@@ -81,14 +78,11 @@ def test_connection_that_does_not_fit_is_refused(system, source, target, reason)
     ("name", "value", "reason"),
     [
         ("plant.m1", 1, "m11"),
-        ("plant.m11", "heavy", "m11 .* real"),
         ("plant.m11", -1, "m11 = -1"),
         ("plant.m11", "nan", "must be finite"),
         ("plant.noise.seed", 1.5, "not an integer"),
         ("controller.printed_jacobian", "perhaps", "not a Boolean"),
-        ("controller.saturation", "sigmoid", "tanh, algebraic"),
         ("plant.tau_min.q", 0.0, None),
-        ("plant.actuator.T.u", -1, "plant.actuator.T.u = -1"),
         ("plant.y.x", 1, "plant.y.x .* output"),
         ("plant.tau.u", 1, "controller.tau.u"),
         ("pilot.mood", 1, "'pilot'"),
@@ -102,13 +96,6 @@ def test_wrong_parameter_is_refused_in_one_line(system, name, value, reason):
     with pytest.raises(InputError, match=reason) as error:
         run(system.with_parameters(values), 1.0, 0.02)
     assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("name", ["plant.eta0.phi", "plant.nu0.p"])
-def test_roll_that_is_held_cannot_start_otherwise(system, name):
-    values = {port("plant.roll"): False, port(name): 0.1}
-    with pytest.raises(InputError, match="roll"):
-        run(system.with_parameters(values), 1.0, 0.02)
 
 
 @pytest.mark.parametrize("loop", LOOPS)
@@ -182,22 +169,21 @@ print(sum(path.is_dir() for path in folder.iterdir()))
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("loop", ["compiled", *slow("python")])
-def test_ctrl_c_ends_a_script_that_simulates(dist: Path, tmp_path: Path, loop: str):
+def test_ctrl_c_ends_a_script_that_simulates(dist: Path, tmp_path: Path):
     code = """
 import os, signal, sys, threading
 from orchestrator import load, simulate
 system = load(sys.argv[1])
 threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
 for _ in range(1000):
-    simulate(system, stop_time=20.0, loop=sys.argv[2])
+    simulate(system, stop_time=20.0, loop="compiled")
 """
-    process = python(code, dist / "auv.ssp", loop, folder=tmp_path)
+    process = python(code, dist / "auv.ssp", folder=tmp_path)
     assert "KeyboardInterrupt" in process.stderr
     assert process.returncode != 0
 
 
-@pytest.mark.parametrize("name", ["a+b", *slow("größe", "100%", "a%2Bb", "(x) & 'y'", "#1?")])
+@pytest.mark.parametrize("name", ["a+b", *slow("größe", "a%2Bb", "(x) & 'y' #1?")])
 def test_a_temporary_folder_of_any_name_is_left_empty(dist: Path, tmp_path: Path, name: str):
     """Our loader decodes what PythonFMU does not; without it such a folder is refused."""
     folder = tmp_path / name
@@ -248,15 +234,3 @@ def test_ssp_holds_the_system_it_was_made_from(system, dist):
     assert list(again.components) == list(system.components)
     assert (again.stop_time, again.step) == (100.0, 0.02)
     assert ssp_bytes(system) == (dist / "auv.ssp").read_bytes()
-
-
-def test_csv_opens_in_the_reader_of_fmpy_and_loses_no_digit(system, tmp_path):
-    result, path = run(system, 1.0, 0.02), tmp_path / "result.csv"
-    write(result, path)
-    table = read_csv(path)
-    assert table.dtype.names == ("time", *result.columns)
-    assert np.array_equal(table["time"], result.time)
-    for name in result.columns:
-        assert np.array_equal(table[name], result[name])
-    assert read_columns(path) == result.columns
-    assert np.array_equal(np.vstack(list(read_rows(path))), result.rows)

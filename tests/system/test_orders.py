@@ -92,18 +92,6 @@ def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
     assert (table.rows.tobytes() == derived.rows.tobytes()) == same
 
 
-@pytest.mark.parametrize("order", Experiment.ORDERS)
-def test_equal_steps_of_all_components_are_one_step(order):
-    system, experiment = load("fig4", NATIVE), Experiment(4.0, 0.02, order)
-    whole = run(system, experiment)
-    same = run(replace(system, steps=dict.fromkeys(system.components, 0.02)), experiment)
-    assert same.rows.tobytes() == whole.rows.tobytes()
-    # All of them slow: every second row is that of the longer step; 2 k h is the same number.
-    finer = replace(experiment, step=0.01)
-    slow = run(replace(system, steps=dict.fromkeys(system.components, 0.02)), finer)
-    assert slow.rows[::2].tobytes() == whole.rows.tobytes()
-
-
 def test_isolated_components_have_steps_of_their_own_too(folder):
     system = ring(folder, declares=False, steps={"b": 2 * H, "c": 3 * H})
     experiment = Experiment(10.5 * H, H)
@@ -133,7 +121,6 @@ def test_steps_follow_from_what_is_stated_and_else_from_the_fmus(folder):
     ("options", "words"),
     [
         ({"step": 0.02, "steps": {"plant": 0.03}}, "plant 0.03 s"),
-        ({"step": 0.02, "steps": {"plant": 0.01}}, "plant 0.01 s"),
         ({"steps": {"plant": -1.0}}, "plant -1.0"),
         ({"steps": {"plnt": 0.1}}, "'plnt' plant"),
         ({"steps": {"plant": 0.0123457}}, "0.0123457, 0.02 s"),

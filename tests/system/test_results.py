@@ -21,7 +21,6 @@ from orchestrator.cosim import Experiment, make_plan
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
 from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.result import read_result
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import read_columns, read_rows
 from orchestrator.studies.engine import FmuEngine, Point
@@ -54,20 +53,9 @@ def test_interval_and_columns_choose_from_the_same_numbers():
 
 
 def test_interval_below_the_step_is_said(capsys):
-    for interval, wanted in (("0.019", True), ("0.02", False)):
-        given = ["--stop-time", "0.1", "--no-figures", "--interval", interval]
-        assert main(["run", "fig4", *given]) == 0
-        assert mentions(capsys.readouterr().err, "--interval 0.019 0.02") == wanted
-        assert len(rows("results/fig4/result.csv")) == 6
-
-
-def test_a_companion_without_a_column_does_without_it():
-    arguments = ["--stop-time", "0.1", "--no-figures", "--columns", "controller.y_hat,plant.y"]
-    assert main(["run", "fig5", *arguments]) == 0
-    assert "controller.y_hat.x" in read_columns(Path("results/fig5/result.csv"))
-    assert read_columns(Path("results/fig5/fig5-pd/result.csv")) == tuple(
-        f"plant.y.{k}" for k in "xyz"
-    )
+    assert main(["run", "fig4", "--stop-time", "0.1", "--no-figures", "--interval", "0.019"]) == 0
+    assert mentions(capsys.readouterr().err, "--interval 0.019 0.02")
+    assert len(rows("results/fig4/result.csv")) == 6
 
 
 def test_our_own_table_is_verified_with_the_step_of_its_scenario(capsys):
@@ -164,26 +152,13 @@ def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
     )
 
 
-def test_stored_result_is_read_again_with_its_parameters():
-    assert main(["run", "fig4", "--stop-time", "1", "--no-figures"]) == 0
-    name, table, *_ = read_result(Path("results/fig4"))
-    again = simulate("fig4", stop_time=1.0)
-    assert name == "fig4"
-    assert np.array_equal(table.rows, again.rows)
-    assert {str(name): value for name, value in table.parameters.items()} == again.parameters
-
-
 def test_record_tells_by_its_identity_whether_numbers_are_the_same():
     def recorded(name: str, **how: object) -> dict[str, Any]:
         result = simulate("fig4", stop_time=0.1, kind="native", **how)
         return json.loads((result.save(name) / "run.json").read_text())
 
     first = recorded("first")
-    same = [
-        recorded("loop", loop="python"),
-        recorded("isolated", isolate=True),
-        recorded("own", parameters={"plant.noise.std": 0.001}),
-    ]
+    same = [recorded("loop", loop="python"), recorded("isolated", isolate=True)]
     assert {record["identity"] for record in same} == {first["identity"]}
     other = recorded("other", steps={"controller": 0.04})
     assert other["identity"] != first["identity"]
@@ -203,25 +178,25 @@ def peak_memory(*arguments: str) -> int:
 
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_length_of_a_run():
-    """60,000 rows of 95 values are 46 MB: none of it is kept."""
+    """30,000 rows of 95 values are 23 MB: none of it is kept."""
     short = peak_memory("--stop-time", "20", "--no-figures")
-    long = peak_memory("--stop-time", "1200", "--no-figures", "--interval", "1")
-    assert long - short < 10e6
+    long = peak_memory("--stop-time", "600", "--no-figures", "--interval", "1")
+    assert long - short < 8e6
 
 
 @pytest.mark.slow
 def test_simulate_again_and_again_in_one_process_in_flat_memory():
-    """300 runs; 100 before, in which Python and the FMUs fill their caches."""
+    """100 runs; 50 before, in which Python and the FMUs fill their caches."""
 
     def resident() -> int:
         return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
-    for _ in range(100):
+    for _ in range(50):
         simulate("fig4", stop_time=0.1)
     before = resident()
-    for _ in range(300):
+    for _ in range(100):
         simulate("fig4", stop_time=0.1)
-    assert resident() - before < 3e6
+    assert resident() - before < 1e6
 
 
 def test_gains_that_the_step_cannot_follow_are_told(capsys: pytest.CaptureFixture[str]):
@@ -235,7 +210,8 @@ def test_gains_that_the_step_cannot_follow_are_told(capsys: pytest.CaptureFixtur
 
 
 def test_chatter_of_the_robust_term_is_told(capsys: pytest.CaptureFixture[str]):
-    quiet = ["run", "fig4", "--no-figures", "--stop-time", "60", "--set", "plant.noise.std=0"]
+    quiet = ["run", "fig4", "--no-figures", "--loop", "compiled"]
+    quiet += ["--stop-time", "60", "--set", "plant.noise.std=0"]
     assert main(quiet) == 0
     assert "warning" not in capsys.readouterr().err
     assert main([*quiet, "--set", "controller.eps_t=0.01"]) == 0
