@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import subprocess
-import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -405,22 +403,3 @@ def test_threads_have_noise_of_their_own():
         side_by_side = list(pool.map(lambda run: next(batch.outcomes([run])), runs))
     assert side_by_side == list(batch.outcomes(runs))
     assert len({outcome.indices["late_error"] for outcome in side_by_side}) == len(runs)
-
-
-def test_another_process_finds_the_program_compiled(tmp_path):
-    """And needs no compiler."""
-    text = (
-        "from orchestrator.program import library\n"
-        "from orchestrator.studies.engine import Point\n"
-        "import pickle, sys\n"
-        "library.compile_text = lambda *_: sys.exit('it compiles')\n"
-        "engine = pickle.load(sys.stdin.buffer)\n"
-        "print(*engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
-    )
-    batch, _ = engines("fig4")
-    outcomes = list(batch.outcomes([Point(0, "fig4", {}, 0.1, 0.02)]))
-    said = subprocess.run(
-        [sys.executable, "-c", text],
-        input=pickle.dumps(batch), capture_output=True, check=True, cwd=tmp_path,
-    )  # fmt: skip
-    assert said.stdout.decode().split() == str(outcomes[0]).split()

@@ -11,13 +11,12 @@ from shutil import copytree
 
 import pytest
 
-from orchestrator import load, simulate
+from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim import Checkpoints, Ending, Run, System, write_ssp
+from orchestrator.cosim import Checkpoints, Ending, Run, System
 from orchestrator.cosim.hooks import checkpoint
 from orchestrator.runs.bundle import current_fmus
 from support import others, typed
-from support.fleets import fleet_of
 from support.machine import contents, ended, eventually, forked, killed_at, start
 from support.texts import mentions
 from support.tiers import slow
@@ -83,18 +82,6 @@ def one_left(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture
 def left(one_left: Path) -> None:
     copytree(one_left, "r")
-
-
-def test_a_run_of_nested_vehicles_is_resumed_with_what_was_done_to_them():
-    """A bias of the second vehicle's position is part of the state."""
-    events = '[[events]]\nat = 0.2\nbias = {"auv2.plant.y" = [0.1, 0.2, 0.3]}\n'
-    Path("events.toml").write_text(events)
-    [ssp] = write_ssp(fleet_of(load("fig4", "native"), 2), Path())
-    arguments = [str(ssp), "--stop-time", "1", "--no-figures", "--events", "events.toml"]
-    assert run(*arguments, out="whole") == 0
-    killed_after(2, *arguments, *CHECKPOINTS, out="killed")
-    assert run(*arguments, "--resume", out="killed") == 0
-    assert result("killed") == result("whole")
 
 
 @pytest.mark.parametrize(

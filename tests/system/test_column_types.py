@@ -280,22 +280,3 @@ def test_a_table_with_every_type_is_verified(fmu: Path, tmp_path: Path):
     with pytest.raises(InputError) as error:
         verify(table, system, 0.0)
     assert mentions(str(error.value), "line 3 0.125")
-
-
-@pytest.mark.parametrize("ending", TABLES)
-def test_what_a_command_has_written_is_read_with_its_types(
-    fmu: Path, tmp_path: Path, ending: str, monkeypatch: pytest.MonkeyPatch
-):
-    """All columns, or some of them; and drawn by a command."""
-    monkeypatch.chdir(tmp_path)
-    values = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
-    write_ssp(typed.system_of(fmu, parameters=values), tmp_path)
-    chosen = {"a.u_Int64", "a.u_UInt64", "a.u_String"}
-    for names, columns in ((values, "a.*"), (chosen, "a.y_*64,a.y_String")):
-        arguments = ["run", "typed.ssp", "--stop-time", "0.25", "--step", "0.125", "--out", "r"]
-        assert main([*arguments, "--format", ending, "--columns", columns, "--no-figures"]) == 0
-        stored = read("r")
-        for name in names:
-            assert stored[name.replace(".u_", ".y_")].tolist() == [values[name]] * 3
-        assert stored.parameters["a.end_at"] == inf
-    assert main(["plot", "r", "a.y_Int64", "--out", "plot.png"]) == 0

@@ -49,16 +49,6 @@ def test_build_writes_fmus_ssp_and_checksums(workplace, capsys):
     assert "is up to date" in capsys.readouterr().out
 
 
-@pytest.mark.slow
-def test_kinds_take_each_others_place_in_a_folder(dist: Path, native: Path, workplace: Path):
-    shutil.copytree(native, workplace / "here")
-    assert main(["build", "--out", "here"]) == 0
-    assert main(["build", "--out", "there", "--kind", "native"]) == 0
-    for name in (*(f"{name}.fmu" for name in NAMES), "auv.ssp", "SHA256SUMS"):
-        assert (workplace / "here" / name).read_bytes() == (dist / name).read_bytes()
-        assert (workplace / "there" / name).read_bytes() == (native / name).read_bytes()
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_fmu_is_valid_and_small_and_says_who_made_it(native: Path, name: str):
     path = native / f"{name}.fmu"
@@ -98,26 +88,6 @@ def test_fmus_of_a_file_are_as_they_are(dist: Path, workplace: Path):
     }
     expected = simulate("fig4", stop_time=1.0, kind="python")
     assert np.array_equal(simulate("own.toml", stop_time=1.0, kind="native").rows, expected.rows)
-
-
-def test_systems_of_both_kinds_differ_in_their_files_alone():
-    python, native = (load("fig4", kind=kind) for kind in KINDS)
-    assert python.connections == native.connections
-    assert python.parameters == native.parameters
-    assert (python.stop_time, python.step) == (native.stop_time, native.step)
-    for name, component in python.components.items():
-        other = native.components[name]
-        assert component.fmu != other.fmu
-        for ours, theirs in zip(
-            component.description.modelVariables, other.description.modelVariables, strict=True
-        ):
-            for attribute in ("name", "valueReference", "type", "causality", "variability",
-                              "initial", "unit", "start", "min", "max", "description"):  # fmt: skip
-                assert getattr(ours, attribute) == getattr(theirs, attribute)
-        assert all(
-            component.has_feedthrough(v.name) == other.has_feedthrough(v.name)
-            for v in component.having("output")
-        )
 
 
 def test_export_with_fmi_3_is_an_ssp_2(workplace: Path):

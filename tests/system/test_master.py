@@ -205,12 +205,6 @@ def test_temporary_folder_that_would_crash_a_plain_fmu_is_refused(dist: Path, tm
     check_place(tmp_path / "a b")
 
 
-def test_fmus_are_unpacked_once_a_process(system: System, monkeypatch: pytest.MonkeyPatch):
-    run(system, 0.1, 0.02)
-    monkeypatch.setattr(zipfile.ZipFile, "extractall", None)
-    run(system, 0.1, 0.02)
-
-
 def test_broken_and_missing_fmus_are_refused(tmp_path: Path, dist: Path):
     with pytest.raises(InputError, match=r"missing\.fmu"):
         read_component("plant", tmp_path / "missing.fmu")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
@@ -11,7 +10,6 @@ import numpy as np
 import pytest
 
 from fmus.kinds import NATIVE
-from orchestrator.commands.main import main
 from orchestrator.cosim import Experiment, Isolation, System, Table, make_plan, simulate_plan
 from orchestrator.cosim.stages import arrange
 from orchestrator.machine.errors import InputError
@@ -131,19 +129,6 @@ def test_steps_that_cannot_be_are_refused(options, words):
     with pytest.raises(InputError) as error:
         simulated(system, **options)
     assert mentions(str(error.value), words)
-
-
-def test_a_scenario_may_state_order_and_steps(workplace):
-    Path("slow.toml").write_text(
-        'order = "jacobi"\nstop_time = 0.2\n[steps]\ncontroller = 0.04\n', encoding="utf-8"
-    )
-    options = ["--no-figures", "--kind", "native", "--out"]
-    assert main(["run", "slow.toml", *options, "r"]) == 0
-    experiment = json.loads(Path("r/run.json").read_text())["experiment"]
-    assert (experiment["order"], experiment["steps"]["controller"]) == ("jacobi", 0.04)
-    order = ["disturbance", "planner", "controller", "plant"]
-    assert main(["run", "slow.toml", "--order", ",".join(order), *options, "s"]) == 0
-    assert json.loads(Path("s/run.json").read_text())["experiment"]["order"] == order
 
 
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])

@@ -197,6 +197,8 @@ def test_number_that_makes_no_sense_is_refused(workplace, refused, command, numb
         ("animate fig4 --stop-time 0.1 --out film.avi", ".gif"),
         ("sweep nothing", "'nothing'"),
         ("sweep attraction --workers 0", "--workers 0"),
+        ("sweep attraction --workers 2 --scheduler nowhere", "--workers"),
+        ("sweep attraction --out file.csv", "file.csv"),
         ("report --out file.csv/below", "--out"),
         ("hosts nobody", "nobody"),
         ("new controller 3x", "'3x'"),

@@ -58,13 +58,6 @@ def test_interval_below_the_step_is_said(capsys):
     assert len(rows("results/fig4/result.csv")) == 6
 
 
-def test_our_own_table_is_verified_with_the_step_of_its_scenario(capsys):
-    Path("fine.toml").write_text("stop_time = 0.5\nstep = 0.01\n")
-    assert main(["run", "fine.toml", "--no-figures"]) == 0
-    assert main(["verify", "results/fine/result.csv", "--scenario", "fine.toml"]) == 0
-    assert "to 0.5 s" in capsys.readouterr().out
-
-
 def test_parquet_holds_the_same_numbers():
     pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     assert main(["run", "fig4", "--stop-time", "1", "--no-figures"]) == 0
@@ -72,27 +65,6 @@ def test_parquet_holds_the_same_numbers():
     assert main(["run", "fig4", "--stop-time", "1", "--no-figures", "--format", "parquet"]) == 0
     assert np.array_equal(rows("results/fig4/result.parquet"), text)
     assert not Path("results/fig4/result.csv").exists(), "of the earlier run"
-
-
-def test_record_says_what_was_run_and_with_what():
-    assert main(["run", "fig5", "--stop-time", "0.2", "--set", "plant.m11=26", "--no-figures"]) == 0
-    record = json.loads(Path("results/fig5/run.json").read_text())
-    assert record["command"][:3] == ["auv-fmu", "run", "fig5"]
-    assert record["scenario"] == "fig5"
-    experiment = {
-        "start_time": 0.0,
-        "stop_time": 0.2,
-        "step": 0.02,
-        "order": "feedthrough",
-        "coupling": None,
-    }
-    assert record["experiment"] == experiment | {"steps": {}}
-    assert record["parameters"]["plant.m11"] == 26.0
-    assert record["fmus"].keys() == {"plant", "controller", "disturbance", "planner"}
-    assert {"python", "auv-fmu", "fmpy", "numpy"} <= record["versions"].keys()
-    assert "fig5-pd/result.csv" in record["files"]
-    companion = json.loads(Path("results/fig5/fig5-pd/run.json").read_text())
-    assert companion["fmus"]["controller"]["file"] == "PdController.fmu"
 
 
 def with_another_content(fmu: Path) -> None:

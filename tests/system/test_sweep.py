@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -161,19 +160,6 @@ def test_study_goes_on_with_the_kind_that_it_was_begun_with(study):
     result = sweep("mine.toml", out="here", workers=1)
     assert files(Path("here"))["runs.parquet"] == before
     assert result.record["kind"] == "python"
-
-
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("--workers 0", "--workers 0"),
-        ("--workers 2 --scheduler nowhere", "--workers"),
-        ("--scheduler nowhere", "nowhere" if find_spec("distributed") else "Dask"),
-        ("--out mine.toml", "mine.toml"),
-    ],
-)
-def test_what_cannot_be_done_is_one_line(study, refused, options, words):
-    assert words in refused("sweep", "mine.toml", "--kind", "native", *options.split())
 
 
 OWN = """

@@ -10,11 +10,10 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim import PortName, System
+from orchestrator.cosim import PortName
 from orchestrator.runs.wiring import read_wiring
-from orchestrator.vehicle.cautions import velocities_reaching
-from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
-from orchestrator.vehicle.proof import certificates, gain_check
+from orchestrator.vehicle.indices import INDICES, VEHICLES
+from orchestrator.vehicle.proof import gain_check
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 from support.live import needs_npm
 from support.pages import stored
@@ -88,25 +87,6 @@ def test_each_vehicle_has_the_numbers_that_it_has_alone(results, alone, name):
     assert apart == (results / "two" / certificates[1]).read_bytes()
 
 
-def inner(system: System) -> System:
-    """The same with components named as in a nested system, of which several may have a plant."""
-    return system.renamed({name: f"auv1.{name}" for name in system.components})
-
-
-def test_names_of_components_may_have_dots():
-    flat_system = load("fig4", "native")
-    system = inner(flat_system)
-    [loop] = loops_of(system)
-    named = {role: f"auv1.{name}" for role, name in vars(STANDARD).items()}
-    assert vars(loop) == named
-    found, flat = (simulate(one, stop_time=1.0) for one in (system, flat_system))
-    for key in ("l2_effort", "peak_command", "final_error", "velocities_reaching_controller"):
-        assert found.metrics()[key] == flat.metrics()[key]
-    assert (certificates(found, loop) == certificates(flat)).all()
-    reaching = velocities_reaching(inner(load("fig5-pd", "native")), loop)
-    assert reaching == [f"auv1.plant.dy.{axis}" for axis in "xyz"]
-
-
 def test_each_vehicle_is_drawn(results):
     names = {path.name for path in (results / "two").iterdir()}
     for name in ("plant", "tow"):
@@ -135,22 +115,6 @@ def test_all_vehicles_are_on_one_page(results, capsys):
 def test_theorem_is_said_of_each(results):
     text = gain_check(load(results / "two.toml", "native"))
     assert text.startswith("plant:\n") and "\ntow:\n" in text
-
-
-def test_a_study_has_columns_of_each(results, tmp_path):
-    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    from orchestrator import sweep  # noqa: PLC0415
-
-    study = {
-        "scenario": str(results / "two.toml"), "stop_time": 0.2,
-        "vary": {"pilot.eps_t": [10.0, 30.0]},
-    }  # fmt: skip
-    result = sweep(study, kind="native", out=tmp_path / "s", workers=1)
-    columns = index_columns([STANDARD, OTHER])
-    assert set(columns) <= set(result)
-    assert len(set(result["plant.l2_effort.u"])) == 1
-    assert len(set(result["tow.l2_effort.u"])) == 2
-    assert np.isfinite(result["tow.late_error"]).all()
 
 
 # Vehicles that a scenario counts
