@@ -110,7 +110,7 @@ def _same_imports() -> Iterator[None]:
 
 
 def _copy(fmus: Path, module: str, folder: Path, *options: str, **_: object) -> None:
-    """Take the place of what would build them once more."""
+    """Copy FMUs instead of building them again."""
     shutil.copytree(fmus, folder, dirs_exist_ok=True)
 
 
@@ -165,14 +165,14 @@ def ready(shared: Path) -> Path:
 
 
 def _copy_ready(ready: Path, module: str, folder: Path, *options: str, **_: object) -> None:
-    """Take the place of what would build FMUs for all platforms once more."""
+    """Copy FMUs for all platforms instead of building them again."""
     kind, fmi = (options[options.index(name) + 1] for name in ("--kind", "--fmi"))
     _copy(ready / bundle.CATEGORY / bundle.key_of(kind, fmi), module, folder)
 
 
 @pytest.fixture(scope="session")
 def release(shared: Path, ready: Path) -> dict[str, Path]:
-    """What the archives of a release unpack to, by versions of FMI; to be read only."""
+    """Folders from the archives of a release, by versions of FMI; to be read only."""
     folder = shared / "release"
     folder.mkdir(exist_ok=True)
     with hold_lock(folder, wait=True), pytest.MonkeyPatch.context() as patch:
@@ -192,7 +192,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., str]:
-    """What `auv-fmu` says of arguments that it refuses: a line that can be read, and no file."""
+    """A function that returns the one line with which `auv-fmu` refuses arguments."""
 
     def said(*arguments: str, status: int = 2) -> str:
         capsys.readouterr()

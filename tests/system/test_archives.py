@@ -70,7 +70,7 @@ def test_description_that_cannot_be_meant_is_refused(dist, tmp_path, old, new, w
         read_component("plant", fmu)
 
 
-def test_all_that_is_wrong_with_a_description_is_said(dist: Path, tmp_path: Path):
+def test_every_mistake_in_a_description_is_reported(dist: Path, tmp_path: Path):
     content = entries(dist / "AuvPlant.fmu")
     text = content[DESCRIPTION].decode().replace('causality="output"', 'causality="outptu"')
     fmu = zipped(tmp_path / "wrong.fmu", {**content, DESCRIPTION: text.encode()})

@@ -79,7 +79,7 @@ def changes(values: Mapping[str, Any]) -> dict[Any, Any]:
 
 
 @pytest.mark.parametrize("name", ready_studies())
-def test_runs_of_studies_are_those_of_the_fmus(name):
+def test_runs_of_studies_equal_the_fmus(name):
     """All indices; why a run fails is left to the FMUs."""
     runs = sampled(name)
     batch, fmus = engines(*read_study(name).scenario)
@@ -119,14 +119,14 @@ PLANTS_FIRST: Order = ("plant", "disturbance", "planner", "controller")
     ("name", "order"), [("fig4", None), ("fig5-pd", "jacobi"), ("path", "feedthrough"),
                         ("sea", None), ("remus", "jacobi"), ("remus-pd", "feedthrough")]
 )  # fmt: skip
-def test_every_column_is_that_of_the_fmus(name, order):
+def test_every_column_equals_the_fmus(name, order):
     compare_with_fmus(name, Point(0, name, NOISY, 4.01, 0.02, order))
 
 
 @pytest.mark.parametrize(
     "order", ["feedthrough", "jacobi", PLANTS_FIRST, PLANTS_FIRST[::-1]], ids=str
 )
-def test_orders_are_those_of_the_fmus(order):
+def test_orders_equal_the_fmus(order):
     """One engine makes runs of all orders. An exact observer shows the gain of the step before."""
     values = {**NOISY, "controller.observer": "exact"}
     compare_with_fmus("fig5", Point(0, "fig5", values, 2.01, 0.02, order))
@@ -135,7 +135,7 @@ def test_orders_are_those_of_the_fmus(order):
 @pytest.mark.parametrize(
     ("name", "order"), [("formation-v", "feedthrough"), ("formation-change", "jacobi")]
 )
-def test_fleets_are_those_of_the_fmus(name, order):
+def test_fleets_equal_the_fmus(name, order):
     """The smallest distance between vehicles is among the indices; a star means all of them."""
     values = {"auv*.plant.noise.std": 0.01, "auv2.plant.m11": 26.0, "auv3.controller.K1": (9, 9, 8)}
     point = Point(0, name, values, 2.01, 0.02, order)
@@ -145,7 +145,7 @@ def test_fleets_are_those_of_the_fmus(name, order):
 
 
 @pytest.mark.parametrize(("name", "start"), [("fig4", -1.0), ("path", 10.0)])
-def test_start_times_are_those_of_the_fmus(tmp_path, name, start):
+def test_start_times_equal_the_fmus(tmp_path, name, start):
     times = {"start_time": start, "stop_time": start + 4.0, "step": 0.02}
     write_ssp(replace(systems(name)[name], name="later", **times), tmp_path)
     point = Point(0, "", NOISY, start + 4.0, 0.02, start_time=start)
@@ -156,7 +156,7 @@ def test_start_times_are_those_of_the_fmus(tmp_path, name, start):
     ("slow", "order"),
     [("controller = 0.2", "jacobi"), ("planner = 0.06\ndisturbance = 0.04", PLANTS_FIRST)],
 )
-def test_components_with_longer_steps_are_those_of_the_fmus(tmp_path, slow, order):
+def test_components_with_longer_steps_equal_the_fmus(tmp_path, slow, order):
     path = tmp_path / "slow.toml"
     path.write_text(f"stop_time = 4.0\n[steps]\n{slow}\n")
     compare_with_fmus(str(path), Point(0, "", NOISY, 4.0, 0.02, order))
@@ -200,13 +200,13 @@ OTHERS = {
 
 
 @pytest.mark.parametrize(("name", "order"), zip(OTHERS, cycle(ORDERS), strict=False))
-def test_other_systems_are_those_of_the_fmus(tmp_path, name, order):
+def test_other_systems_equal_the_fmus(tmp_path, name, order):
     path = tmp_path / "own.toml"
     path.write_text(OTHERS[name])
     compare_with_fmus(str(path), Point(0, "", {}, 4.01, 0.02, order))
 
 
-def test_a_controller_of_ones_own_is_that_of_its_fmu(workplace):
+def test_a_users_controller_equals_its_fmu(workplace):
     assert main(["new", "controller", "my_law"]) == 0
     script, scenario = Path("my_law/my_law.py"), Path("my_law/my_law.toml")
     assert main(["build", str(script), "--kind", KIND]) == 0
@@ -239,15 +239,15 @@ ADDITIONS: list[tuple[str, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("addition", "order"), zip(ADDITIONS, cycle(ORDERS), strict=False))
-def test_additions_are_those_of_the_fmus(addition, order):
+def test_additions_equal_the_fmus(addition, order):
     name, values = addition
     compare_with_fmus(name, Point(0, name, values, 2.01, 0.02, order))
 
 
-# What is refused
+# Refusals
 
 
-#: What components refuse: values, values that do not fit, starts, steps.
+#: Refused by components: values, values that do not fit, starts, steps.
 MISTAKES: list[tuple[str, dict[str, Any]]] = [
     ("fig4", {"controller.gamma": -1.0}),
     ("fig4", {"plant.tau_min.u": 0.0, "plant.tau_max.u": 0.0, "planner.eta0.theta": 1.6}),
@@ -373,7 +373,7 @@ def test_an_fmu_of_another_tool_is_refused_by_name(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["fig4", "formation-v"])
-def test_an_index_of_ones_own_is_that_of_the_fmus(name):
+def test_a_users_index_is_the_same_in_both_engines(name):
     own = (OwnIndex("largest_depth", Path(largest_depth.__file__).read_bytes()),)
     run = Point(0, name, {}, 2.01, 0.02)
     compare_with_fmus(name, run, own)

@@ -69,7 +69,7 @@ int main(void) {
 }
 """
 
-#: What a program may need of others: functions of the C library that compute or copy.
+#: Functions of the C library that a program may call: they compute or copy.
 ALLOWED = re.compile(
     r"_GLOBAL_OFFSET_TABLE_|__stack_chk_fail|mem(cpy|cmp|set)"
     r"|(sin|cos|tan|asin|acos|atan|atan2|sincos|tanh|exp|expm1|log|log1p|sqrt|pow|fmod|fmin|fmax"
@@ -83,7 +83,7 @@ def compile_c(*command: object) -> None:
 
 @pytest.fixture(scope="module")
 def programs(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the files of all scenarios, and one in it with those of single precision."""
+    """A folder with the files of all scenarios, and folders for single precision."""
     folder = tmp_path_factory.mktemp("programs")
     for name in SCENARIOS:
         export(name, folder / name)
@@ -105,7 +105,7 @@ def sources(folder: Path) -> list[Path]:
 
 
 def printed(folder: Path, steps: int, *options: str) -> tuple[list[str], np.ndarray]:
-    """What a program prints: its columns, without the time, and its rows."""
+    """Compile and run a program: its columns, without the time, and its rows."""
     program, table = folder / "program", folder / "table.csv"
     compile_c(GCC, *STRICT, "-O2", *EXACT, *options, f"-DSTEPS={steps}", *sources(folder),
               "-o", program, "-lm")  # fmt: skip
@@ -126,7 +126,7 @@ def rows_of(result: Result, columns: list[str]) -> np.ndarray:
 
 @needs_gcc
 @pytest.mark.parametrize("name", SCENARIOS)
-def test_table_is_that_of_a_run_bit_for_bit(programs: Path, name: str):
+def test_table_equals_a_run_bit_for_bit(programs: Path, name: str):
     steps = SCENARIOS[name]
     columns, rows = printed(programs / name, steps)
     np.testing.assert_array_equal(rows, rows_of(expected(name, steps), columns))
@@ -135,7 +135,7 @@ def test_table_is_that_of_a_run_bit_for_bit(programs: Path, name: str):
 @needs_gcc
 @pytest.mark.parametrize("name", SINGLE)
 def test_single_precision_has_no_double_and_the_same_motion(programs: Path, name: str):
-    """The friction follows the sign of velocities that are zero but for rounding: not compared."""
+    """The friction follows the sign of velocities that are zero except for rounding: not compared."""
     steps = SCENARIOS[name]
     columns, rows = printed(programs / f"{name}-single", steps, "-Wdouble-promotion")
     text = sources(programs / f"{name}-single")[0].read_text(encoding="utf-8")
@@ -181,7 +181,7 @@ def symbols(path: Path, folder: Path) -> dict[str, str]:
 
 @needs_gcc
 @pytest.mark.parametrize("name", ["sea", "path-single"])
-def test_program_has_no_variables_and_calls_mathematics_alone(
+def test_program_has_no_variables_and_calls_only_mathematics(
     programs: Path, tmp_path: Path, name: str
 ):
     found = symbols(sources(programs / name)[0], tmp_path)
@@ -237,7 +237,7 @@ def test_header_tells_the_bytes_that_a_program_takes(
 @needs_arm
 @pytest.mark.skipif(QEMU is None, reason="qemu-system-arm is not installed")
 @pytest.mark.parametrize(("kind", "tolerance"), [("fig4", 1e-9), ("fig4-single", 2e-4)])
-def test_microcontroller_gives_the_same_but_for_rounding(
+def test_microcontroller_gives_the_same_except_for_rounding(
     programs: Path, tmp_path: Path, kind: str, tolerance: float
 ):
     """Two seconds on a Cortex-M4; newlib has another sine."""

@@ -1,4 +1,4 @@
-"""What FMUs carry to be verified with, ours and FMUs that are written here by hand."""
+"""Reference results inside FMUs: those of the project, and of FMUs that are written here."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ def test_experiments_are_judged_one_by_one(tmp_path: Path, capsys):
     ("column", "wrong"), [("mode_y", "calm"), ("fault", "false"), ("heard", "end"), ("y", "6.1")]
 )
 def test_other_types_are_equal_or_not(tmp_path: Path, column: str, wrong: str):
-    """Inputs hold between two rows, and reach the outputs a step later, but for the String."""
+    """Inputs hold between two rows, and reach the outputs a step later, except for the String."""
     fmu = others.build(tmp_path)
     gain = PARAMETERS[: PARAMETERS.index("<ssv:Parameter name")] + (
         '<ssv:Parameter name="gain"><ssv:Real value="3.0"/></ssv:Parameter>'
@@ -217,7 +217,7 @@ def test_other_types_are_equal_or_not(tmp_path: Path, column: str, wrong: str):
 
 @pytest.mark.parametrize(("array", "integer"), [("1.5 3.1", 3), ("1.5 3", 2), ("1.5", 3)])
 def test_arrays_and_integers_of_fmi_3(tmp_path: Path, array: str, integer: int):
-    """M v = w, with M = (1 2 3, 4 5 6) and v = (0, 0, 1/2); 2^53 + 3 is no double."""
+    """M v = w, with M = (1 2 3, 4 5 6) and v = (0, 0, 1/2); no double equals 2^53 + 3."""
 
     def files(array: str, integer: int) -> dict[str, str | None]:
         held = 2**53 + integer
@@ -282,7 +282,7 @@ def changed(file: str, old: str, new: str) -> dict[str, str]:
         ({"lag.ssv": "<ParameterSet"}, "lag.ssv well-formed"),
     ],
 )
-def test_what_cannot_be_verified_is_refused(tmp_path: Path, files, reason: str, capsys):
+def test_an_fmu_that_cannot_be_verified_is_refused(tmp_path: Path, files, reason: str, capsys):
     assert main(["verify", carrying(linear(tmp_path), {**FILES, **files})]) == 2
     out, err = capsys.readouterr()
     assert mentions(out + err, reason)

@@ -38,7 +38,7 @@ controler.k_d = 3
 
 
 def lines(capsys: pytest.CaptureFixture[str]) -> list[str]:
-    """What was shown; nothing was said beside it."""
+    """Lines on the standard output; there are no messages."""
     out, err = capsys.readouterr()
     assert err == ""
     return str(out).splitlines()
@@ -136,7 +136,7 @@ def test_check_of_a_study_finds_what_sweep_finds(content, culprits, workplace, c
 
 
 def toml_text(content: dict[str, Any]) -> str:
-    """Write a table in TOML, whose strings, numbers and lists are those of JSON."""
+    """Write a table in TOML, whose strings, numbers and lists are written as in JSON."""
 
     def inline(value: Any) -> str:
         if not isinstance(value, dict):
@@ -239,7 +239,7 @@ def test_inputs_that_are_set_or_left_open_on_purpose_are_not_named(workplace, ca
     assert lines(capsys) == ["pd.toml: no problems found"]
 
 
-#: What is set of the vehicle, and what is said then.
+#: Parameters of the vehicle, and the message that they cause.
 VEHICLES = {
     "plant.ell = 0.6": (
         "plant.ell = 0.6, but controller.ell = planner.ell = 0.35: "

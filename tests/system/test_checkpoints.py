@@ -1,4 +1,4 @@
-"""Runs that are killed and resumed leave what they would have left if nobody had killed them."""
+"""Runs that are killed and resumed write the same files as runs without interruption."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from support.tiers import slow
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
-#: What differs between two runs of the same: when, how long, and by which command.
+#: Contains time, duration and command, which differ between runs.
 _RECORD = "run.json"
 
 
@@ -61,7 +61,7 @@ def killed_after(checkpoints: int, *arguments: str, out: str) -> None:
 
 
 def states(out: str) -> dict[str, object]:
-    """What a checkpoint holds; nothing, if there is none yet."""
+    """Content of a checkpoint, empty until there is one."""
     path = Path(out, "checkpoint/state.json")
     return json.loads(path.read_text()) if path.exists() else {}
 
@@ -73,7 +73,7 @@ LEFT = ["fig4", "--stop-time", "1", "--no-figures"]
 
 @pytest.fixture(scope="module")
 def one_left(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What a run leaves that was killed after its first checkpoint."""
+    """Files of a run that was killed after its first checkpoint."""
     folder = tmp_path_factory.mktemp("left")
     killed_after(1, *LEFT, *CHECKPOINTS, out=str(folder))
     return folder
@@ -196,7 +196,7 @@ def test_killed_before_any_call_that_changes_the_disk():
 
 @pytest.mark.slow
 def test_killed_at_any_time_by_the_kernel():
-    """With another loop and without isolation it goes on as well."""
+    """It also continues with another loop and without isolation."""
     arguments = ["fig4", "--stop-time", "5", "--no-figures", *CHECKPOINTS]
     assert run(*arguments, out="whole") == 0
     process = start("run", *arguments, "--isolate", "--out", "killed")
@@ -319,7 +319,7 @@ def test_from_python(left):
 
 
 @pytest.mark.parametrize("loop", ["python", "compiled"])
-def test_an_fmu_of_fmi_3_goes_on_with_an_integer_that_no_double_is(loop):
+def test_an_fmu_of_fmi_3_continues_with_an_integer_beyond_doubles(loop):
     begin = 2**53 + 1
     arguments = [str(typed.build(Path())), "--stop-time", "2", "--step", "0.125", "--loop", loop]
     arguments += ["--set", f"typed.counts_from={begin}", "--no-figures"]

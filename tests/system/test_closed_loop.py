@@ -35,7 +35,7 @@ def quiet(system: System) -> Table:
 
 
 def rows_of(instants: Sequence[Instant], setting: Setting, table: Table) -> list[dict[str, float]]:
-    """What every port of the FMU loop must hold in each row of a table."""
+    """Expected value of every port of the FMU loop in each row of a table."""
     late = [instants[0], *instants[:-1]] if table.header.experiment.acting_row else instants
     # Actuators with a lag give what they have come to.
     T = setting.plant.T

@@ -31,7 +31,7 @@ H = 0.125
 LOOPS = ["compiled", "python"]
 TABLES = ["csv", *(["parquet"] if find_spec("pyarrow") else [])]
 
-#: What the types of FMI can hold, by the standard; 64 bits around the last integers of a double.
+#: Ranges of the types of FMI; 64 bits around the last integers of a double.
 RANGES = {
     "Int8": (-(2**7), 2**7 - 1), "UInt8": (0, 2**8 - 1),
     "Int16": (-(2**15), 2**15 - 1), "UInt16": (0, 2**16 - 1),
@@ -129,7 +129,7 @@ def test_a_column_is_what_the_fmu_has_wherever_it_is_read(fmu: Path, rows, data)
             assert [again[c].dtype.kind for c in made.columns] == [
                 made[c].dtype.kind for c in made.columns
             ]
-        # What one run has written, another one can follow.
+        # A run can take the table of another one as inputs.
         write = folder / "csv" / "result.csv"
         lines = list(csv.reader(write.open(encoding="utf-8", newline="")))
         places = [0, *(i for i, name in enumerate(lines[0]) if name.startswith("a.u_"))]
@@ -172,7 +172,7 @@ def test_a_run_with_infinite_parameters_is_read_and_drawn(fmu: Path, tmp_path: P
         assert [one.get_ylabel() for one in axes] == ["a.y_Int64", "a.counter", "a.y_UInt64"]
     arguments = ["plot", str(folder), "a.u_*n*", "--out", str(tmp_path / "plot.png")]
     assert main(arguments) == 0
-    # Earlier versions wrote what is no JSON.
+    # Earlier versions wrote invalid JSON.
     (folder / "run.json").write_text((folder / "run.json").read_text().replace('"inf"', "Infinity"))
     with pytest.warns(UserWarning, match="changed"):
         assert read(folder).parameters["a.end_at"] == inf
@@ -209,7 +209,7 @@ def test_a_cell_that_its_column_cannot_hold_is_refused_by_name(fmu: Path, tmp_pa
 
 
 def test_recorded_inputs_of_32_bits_are_what_the_fmu_has(fmu: Path):
-    """Whether a unit, an event or a table has changed them; computed by IEEE 754's rounding."""
+    """Also after a unit, an event or a table has changed them; expected by IEEE 754's rounding."""
     wires = {"b.u_Float32": "a.y_Float32"}
     system = typed.system_of(fmu, "ab", wires, {"a.u_Float32": 0.1})
     [wire] = system.connections

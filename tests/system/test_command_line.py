@@ -34,7 +34,7 @@ def files(folder: Path) -> set[str]:
 @pytest.mark.usefixtures("quick_builds")
 @pytest.mark.parametrize(("name", "content"), [("AuvPlant.fmu", "cut short"), ("build.json", "[]")])
 def test_build_replaces_what_is_not_what_was_built(dist, workplace, refused, capsys, name, content):
-    """Where it may; and what is as it was built is not written again."""
+    """If forced; an unchanged bundle is not written again."""
     path = shutil.copytree(dist, workplace / "bundle") / name
     path.write_text(content)
     assert name in refused("build", "--out", "bundle")
@@ -49,7 +49,7 @@ def test_build_replaces_what_is_not_what_was_built(dist, workplace, refused, cap
 
 @pytest.fixture
 def quick_builds(dist, monkeypatch):
-    """FMUs are copied from those that were built, in place of building them once more."""
+    """Copy the FMUs of `dist` instead of building them again."""
 
     def copy(module: str, folder: Path, *options: str, **how: object) -> None:
         shutil.copytree(dist, folder, dirs_exist_ok=True)
@@ -74,7 +74,7 @@ def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace, monkeyp
         bundle.current_fmus.cache_clear()
 
 
-def test_run_writes_into_its_folder_alone(workplace, capsys):
+def test_run_writes_only_into_its_folder(workplace, capsys):
     """A table, metrics and figures."""
     assert main(["run", "fig4", "--stop-time", "0.5", "--set", "plant.noise.std=0"]) == 0
     assert files(workplace) == {"results"} and files(workplace / "results") == {"fig4"}
@@ -117,7 +117,7 @@ def test_own_scenario_file_and_ssp_run_the_same_way(dist, workplace):
 
 
 def test_comparison_runs_both_and_changes_both_where_both_have_it(workplace):
-    """Reference and stop time of an edited copy go for the companion as well."""
+    """Reference and stop time of an edited copy also apply to the companion."""
     text = (SCENARIOS / "fig5.toml").read_text()
     copy = text.replace("-30.0", "-60.0").replace("stop_time = 100.0", "stop_time = 0.2")
     (workplace / "mine.toml").write_text(copy)

@@ -1,4 +1,4 @@
-"""A scenario and what it is compared with: the same but for what `[compare]` says."""
+"""A scenario and what it is compared with: equal except for the entries of `[compare]`."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_both_follow_the_reference_of_the_scenario(workplace, text):
     assert not np.array_equal(ours["plant.eta.x"], theirs["plant.eta.x"])
 
 
-def test_only_what_is_said_differs(workplace):
+def test_only_the_listed_differences_differ(workplace):
     ours, theirs = pair_of(
         'only = ["plant", "controller", "planner"]\n'
         '[components]\nplanner = "PathPlanner"\n'
@@ -69,8 +69,8 @@ def test_only_what_is_said_differs(workplace):
     assert replace(theirs.scenario, compare=None).legend == "PD"
 
 
-def test_parameters_of_the_user_win_over_those_of_the_comparison(workplace):
-    """And these over those of the scenario; what a controller lacks is left out."""
+def test_parameters_of_the_user_win_over_the_comparison(workplace):
+    """The comparison wins over the scenario; parameters that a controller lacks are left out."""
     text = (
         "[parameters]\nplant.m11 = 26.0\ncontroller.eps_t = 2.0\ncontroller.k_d = 40.0\n"
         + PD
@@ -92,7 +92,7 @@ def test_a_table_of_inputs_goes_for_both(workplace):
         assert set(table["plant.water.x"]) == {0.25, 0.3}
 
 
-def test_wires_are_removed_whoever_has_stated_them(workplace):
+def test_wires_are_removed_in_either_table(workplace):
     own = '[components]\ncontroller = "PdController"\n[wires]\n"controller.dy" = "plant.dy"\n'
     other = '[compare]\nname = "proposed"\ncomponents.controller = "ObserverController"\n'
     wires = 'wires."controller.dy" = false\nwires."plant.tau_w" = false\n'

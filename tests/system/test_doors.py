@@ -1,4 +1,4 @@
-"""What is run besides scenarios and SSPs: one FMU, an unpacked SSP, and libcosim's own files."""
+"""Other things that can be run: one FMU, an unpacked SSP, and files of libcosim."""
 
 from __future__ import annotations
 
@@ -242,7 +242,7 @@ def test_a_folder_runs_from_within_and_may_lack_a_stop_time(workplace: Path, cap
         ("text.xml", "OspSystemStructure.xml: syntax"),
     ],
 )
-def test_what_is_none_of_these_is_refused_in_one_line(workplace: Path, capsys, name, why):
+def test_other_files_are_refused_in_one_line(workplace: Path, capsys, name, why):
     Path("empty").mkdir()
     Path("other.xml").write_text("<other/>")
     Path("text.xml").write_text("text")

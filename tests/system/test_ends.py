@@ -12,7 +12,7 @@ EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 
 _FEEDTHROUGH = ('<Unknown index="2" dependencies=""/>', '<Unknown index="2" dependencies="1"/>')
 
-#: When nobody ends.
+#: A time after the stop time.
 _NEVER = 100.0
 
 
@@ -45,9 +45,7 @@ def ring(folder, ends, steps=()):
         ("jacobi", "b", 0.02, 1),
     ],
 )
-def test_the_rows_are_those_of_the_steps_before_the_one_in_which_an_fmu_ends(
-    tmp_path, way, order, who, at, rows
-):
+def test_the_rows_before_an_fmu_ends_are_kept(tmp_path, way, order, who, at, rows):
     table = run(
         ring(tmp_path, [at if name == who else _NEVER for name in "abc"]), order=order, **way
     )

@@ -1,6 +1,6 @@
 """Energy of the vehicle: nothing but actuators, disturbances and moving water may add to it.
 
-Its kinetic energy nu_r' M nu_r / 2 is that of the motion through the water, with the added mass. A
+Its kinetic energy nu_r' M nu_r / 2 belongs to the motion through the water, with the added mass. A
 righting moment G that is the same in pitch and roll has the potential -G cos(theta) cos(phi).
 """
 
@@ -27,7 +27,7 @@ rightings = st.floats(0.0, 50.0)
 
 @st.composite
 def parameter_sets(draw, rolls=None):
-    """Any vehicle whose righting moments are those of one centre of buoyancy."""
+    """Any vehicle whose righting moments come from one centre of buoyancy."""
     G = draw(rightings)
     vehicle = Vehicle(*draw(vectors(masses, 5)), *draw(vectors(dampings, 5)), G)
     is_free = draw(st.booleans()) if rolls is None else rolls
@@ -72,14 +72,14 @@ def test_vehicle_at_rest_and_level_in_still_water_stays_so(parameters, position,
 
 
 @given(parameters=parameter_sets(rolls=True), nu=vectors(speeds, 6), euler=vectors(angles, 3))
-def test_power_is_that_of_damping_only(parameters, nu, euler):
+def test_power_comes_from_damping_only(parameters, nu, euler):
     """d/dt energy = -nu_r' D nu_r, of the right-hand side itself, for every vehicle and state."""
     mass, damping = mass_and_damping(parameters)
     rotation = rotation_from_euler(*euler)
     vehicle, roll = parameters.vehicle, parameters.roll
     dnu = plant.accelerations_6dof(vehicle, roll, nu, rotation, NONE_3, NONE_6)
     phi, theta, _ = euler
-    # Of the earth's z-axis in the body, z: d/dt R33 = z_x q - z_y p.
+    # With the earth's z-axis in the body, z: d/dt R33 = z_x q - z_y p.
     upright_rate = -sin(theta) * nu[4] - cos(theta) * sin(phi) * nu[3]
     righting = vehicle.righting_pitch * upright_rate
     power = np.dot(mass * nu, dnu) - righting
@@ -121,7 +121,7 @@ def test_righting_moments_that_differ_are_of_no_potential(pitch, roll):
     vehicle, axis, a = Vehicle(righting_pitch=pitch), RollAxis(righting_roll=roll), 0.6
 
     def moments(tilt_x, tilt_y):
-        """Of a body at rest whose earth's z-axis has tilted in it."""
+        """Righting moments on a tilted body at rest, from the earth's z-axis in it."""
         z = np.array((tilt_x, tilt_y, np.sqrt(1.0 - tilt_x**2 - tilt_y**2)))
         x = np.cross((0.0, 1.0, 0.0), z)
         x /= np.linalg.norm(x)

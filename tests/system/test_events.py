@@ -28,7 +28,7 @@ from support.texts import mentions
 H = 0.02
 STEPS = 120
 
-#: What makes the steps, in which kind of FMUs, and where.
+#: Kinds of FMUs, loops, and isolation.
 WAYS: list[dict[str, Any]] = [
     {"kind": "native", "loop": "compiled"},
     {"kind": "native", "loop": "python"},
@@ -59,7 +59,7 @@ class Span:
 
 
 def straight(delayed: bool) -> Iterator[dict[str, Any]]:
-    """The loop of `auv_fmu.loop.closed_loop`, written out once more, with what EVENTS say."""
+    """The loop of `auv_fmu.loop.closed_loop`, written out again, with EVENTS."""
     setting: Setting = PAPER
     gauss = plant.white_noise(setting.plant.noise.seed).gauss
     vehicles = line.vehicles_at_start(setting)
@@ -95,7 +95,7 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
         tau_w = disturbance(waves, nu_r, k * H)
         before = now
         if k == 95:
-            # What has begun anew shows what it computes then, as at the start.
+            # After a reset it shows its new outputs, as at the start.
             told = signals.tau
         if k in Span(10, 25):
             told = (5.0, *told[1:])
@@ -113,7 +113,7 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
     [*(("feedthrough", way) for way in WAYS), *(("jacobi", way) for way in WAYS[:2])],
     ids=str,
 )
-def test_events_are_those_of_the_straight_line_bit_for_bit(way, order):
+def test_events_equal_the_straight_line_bit_for_bit(way, order):
     table = simulate("fig4", stop_time=STEPS * H, order=order, events=EVENTS, **way)
     assert table.failure is None
     instants = list(straight(order == "jacobi"))
@@ -133,7 +133,7 @@ def test_events_are_those_of_the_straight_line_bit_for_bit(way, order):
     assert len({event.event for event in table.events}) == len(EVENTS)
 
 
-def test_a_component_with_longer_steps_hears_of_it_at_its_next_one():
+def test_a_component_with_longer_steps_takes_an_event_at_its_next_one():
     """From the seventh to the eleventh instant; it takes inputs at even ones."""
     plain, biased = (
         simulate("fig4", stop_time=0.4, kind="native", steps={"controller": 0.04}, events=events)
@@ -148,7 +148,7 @@ def test_a_component_with_longer_steps_hears_of_it_at_its_next_one():
 
 
 def test_a_run_is_replayed_from_its_table_bit_for_bit(tmp_path):
-    """The vehicle alone, with a CSV of the inputs that it had in the loop."""
+    """Only the vehicle, with a CSV of the inputs that it had in the loop."""
     order = "gauss-seidel"
     loop = simulate("fig4", stop_time=2.0, order=order, kind="native")
     names = [name for name in loop.columns if name.startswith(("plant.tau.", "plant.tau_w."))]
@@ -164,7 +164,7 @@ def test_a_run_is_replayed_from_its_table_bit_for_bit(tmp_path):
     for way in WAYS:
         alone = simulate(scenario, order=order, **way)
         for name in alone.columns:
-            # What is commanded at the end never acts.
+            # The last command never acts.
             is_state = not name.startswith("plant.tau")
             one, other = (t[name][1:] if is_state else t.step_values(name) for t in (alone, loop))
             np.testing.assert_array_equal(one, other, name)
@@ -286,10 +286,10 @@ def test_what_a_system_has_not_is_said_where_it_goes_without(workplace: Path, ca
         load("fault-sensor", "native", strict=True)
 
 
-# What is said of the scenarios
+# Remarks of scenarios
 
-#: Of each controller: largest error in the 20 s before the event and after it, when it is below
-#: half a metre for good after the event has ended, and what the commanded force stays below.
+#: By controller: largest error in the 20 s before the event, and after it; how long after the end
+#: of the event the error exceeds half a metre [s]; a bound on the commanded force [N].
 SAID = {
     "fault-thruster": {"proposed": (0.26, 0.88, 2.2, 40.0), "PD": (0.22, 0.87, 2.9, 40.0)},
     "fault-sensor": {"proposed": (0.26, 5.7, 6.6, 219.0), "PD": (0.22, 1.18, 1.8, 80.0)},

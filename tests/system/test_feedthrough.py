@@ -27,8 +27,8 @@ from support.texts import mentions
 
 H, STEPS = 0.1, 30
 
-#: Of a law that follows its inputs at once, what it steers, with an output of either sort, a filter
-#: that is only a state, and a gauge that takes longer steps.
+#: A law with direct feedthrough, a plant with an output of either sort, a filter that is only a
+#: state, and a gauge that takes longer steps.
 PARTS = {
     "filter": Part(B=[[1.0, 0.0]], C=1.0),
     "gauge": Part(D=[[0.0, 0.0], [1.0, 0.0]]),
@@ -66,7 +66,7 @@ def steered(folder: Path, **kind: Any) -> System:
 
 
 def straight() -> Iterator[dict[str, float]]:
-    """The same, in Python, with all that EVENTS say."""
+    """The same in Python, with EVENTS."""
     x, f, gauge, held, biased = 1.0, 0.0, 0.0, 0.0, 0
     for k in range(STEPS + 1):
         seen = x * (2.0 if k >= 20 else 1.0)
@@ -125,7 +125,7 @@ class _Cut:
 
 
 @pytest.mark.parametrize("made", [7, STEPS])
-def test_a_run_goes_on_from_its_checkpoint(folder, tmp_path, made):
+def test_a_run_continues_from_its_checkpoint(folder, tmp_path, made):
     """Also where a component is within a longer step, and where only the last row is left."""
     plan = make_plan(steered(folder), Experiment(STEPS * H, H))
     whole, resumed = Table(), Table()

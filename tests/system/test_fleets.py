@@ -15,7 +15,7 @@ from support.fleets import fleet_of
 
 STOP = 0.8
 
-#: What the second vehicle has otherwise.
+#: Values of the second vehicle.
 CHANGES = {"plant.eta0.y": 2.0, "plant.noise.seed": 7, "controller.eps_t": 30.0}
 
 ORDER = [f"auv{i}.{name}" for name in ("planner", "plant", "disturbance", "controller")
@@ -41,7 +41,7 @@ def run(ssp: Path, out: Path, *options: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("order", "loop"), [("gauss-seidel", "compiled"), ("jacobi", "python")])
-def test_each_vehicle_has_the_numbers_that_it_has_alone(ssp: Path, order: str, loop: str):
+def test_each_vehicle_has_the_numbers_of_its_own_run(ssp: Path, order: str, loop: str):
     together = simulate(ssp, stop_time=STOP, order=order, loop=loop)
     for name, changes in (("auv1", {}), ("auv2", CHANGES)):
         alone = simulate("fig4", changes, kind="native", stop_time=STOP, order=order)

@@ -91,7 +91,7 @@ def test_values_of_all_kinds_are_set_connected_and_recorded(tmp_path, way):
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])
-def test_files_hold_texts_and_give_the_numbers_beside_them_again(workplace, form):
+def test_files_keep_texts_and_numbers(workplace, form):
     """Also where a text has commas, quotes and lines of its own."""
     said = 'one, "two"\nthree'
     [archive] = write_ssp(with_values(system_of(build(workplace)), {"said": said}), workplace)
@@ -183,7 +183,7 @@ def test_an_fmu_that_takes_steps_of_one_length_gets_no_other(tmp_path, way):
 
 
 @EVERY_WAY
-def test_a_step_that_goes_on_after_its_call_is_waited_for(tmp_path, way):
+def test_a_step_that_continues_after_its_call_is_waited_for(tmp_path, way):
     fmu = build(
         tmp_path,
         "WAITS",
@@ -317,7 +317,7 @@ def test_numbers_of_descriptions_that_others_do_not_read_are_refused(
         read_component("a", build(tmp_path, change=change))
 
 
-def test_words_of_tools_are_no_numbers(tmp_path):
+def test_annotations_of_tools_are_not_read_as_numbers(tmp_path):
     """Nor do they matter where the description is wrong in another place."""
     tool = '<Annotations><Tool name="t"><Item value="1_0" min="low"/></Tool></Annotations>'
     change = '<Real start="1"/>', f'<Real start="1" odd="1"/>{tool}'

@@ -82,7 +82,7 @@ def test_followers_lose_their_leader_as_the_remark_says():
         assert lost[during][-1] - lost[during][0] == pytest.approx(20, abs=1)
 
 
-def test_the_first_place_has_the_errors_of_a_vehicle_alone():
+def test_the_first_place_has_the_errors_of_a_single_vehicle():
     """It is the leader's own, and the same run: so are indices that compare at one instant."""
     path = {
         str(name).replace("leader.", "planner."): value
@@ -99,8 +99,8 @@ def test_the_first_place_has_the_errors_of_a_vehicle_alone():
     assert found == pytest.approx(alone.metrics()["final_error"], abs=1e-12)
 
 
-def test_places_in_a_v_are_those_of_geometry():
-    """Where the leader runs straight north, its V lies at 45 degrees to both sides."""
+def test_places_in_a_v_follow_geometry():
+    """The leader runs straight north: its V lies at 45 degrees to both sides."""
     proposed, _ = fleets("formation-v")
     row = int(np.searchsorted(proposed.time, 40.0))
     leader = proposed.group("leader.y_d", "xyz")[row]

@@ -49,7 +49,7 @@ def require(host: str) -> None:
 
 
 def check(system: System, host: str, steps: int) -> None:
-    """Hold all Real outputs of a host against ours."""
+    """Compare all Real outputs of a host with the master's."""
     require(host)
     [verdict] = compare(system, [host], steps, 0.02)
     assert verdict.failure is None
@@ -64,7 +64,7 @@ def test_host_gives_the_numbers_of_our_master_in_its_order(dist: Path, host: str
 
 
 def fleet(dist: Path) -> System:
-    """Two vehicles in systems of their own, of which the second follows the first one's reference.
+    """Two vehicles in systems of their own; the second follows the first one's reference.
 
     Its disturbance reaches nothing: the two differ also where a host applies no parameters.
     """
@@ -191,7 +191,7 @@ def test_tools_without_enumerations_are_held_to_no_choice(dist: Path, host: str)
 
 
 @pytest.mark.parametrize("host", slow("libcosim-ssp", "libcosim-osp"))
-def test_longer_steps_of_components_are_those_of_libcosim(dist: Path, host: str):
+def test_longer_steps_of_components_equal_libcosim(dist: Path, host: str):
     system = replace(closed_loop(dist), steps={"controller": 0.06, "disturbance": 0.04})
     check(system, host, 100)
 
@@ -266,7 +266,7 @@ def test_hosts_apart_are_run_where_they_are_asked_for(
 
 @pytest.mark.skipif(find_spec("ecospy") is None, reason="ecospy is not installed")
 def test_ecos_command_line_runs_the_ssp_with_an_empty_environment(dist: Path, tmp_path: Path):
-    """A host that is no Python program; its table has six digits."""
+    """A host outside Python; its table has six digits."""
     [package] = getattr(find_spec("ecospy"), "submodule_search_locations", [])
     command = tmp_path / "ecos"
     shutil.copy(Path(package, "binaries", "ecos"), command)

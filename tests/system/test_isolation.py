@@ -42,7 +42,7 @@ from support.tiers import slow
 STEP = 0.02
 SHORT = Experiment(0.5, STEP)
 
-#: What FMUs do to the process that they are in, and the run survives.
+#: Damage to its process that a run survives.
 DOES_TO_THE_PROCESS = ("FORKS", "MOVES", "CLOSES_FILES", "ALARMS")
 
 
@@ -88,11 +88,11 @@ def run_isolated(system: System, timeout: float = 20.0) -> Table:
 
 
 def rows_until(table: Table, t: float) -> bool:
-    """Whether there is a row for every step until a time, and none after it."""
+    """True if there is a row for every step until a time, and none after it."""
     return np.array_equal(table.time, np.arange(round(t / STEP) + 1) * STEP)
 
 
-def test_rows_are_those_of_a_run_in_one_process(dist: Path):
+def test_rows_equal_a_run_in_one_process(dist: Path):
     system, experiment = closed_loop(dist), Experiment(1.0, 0.03)
     here, there = whole(system, experiment), whole(system, experiment, isolation=Isolation())
     assert here.header == there.header
@@ -126,7 +126,7 @@ def test_a_foreign_fmu_that_behaves_runs_to_the_end(c_fmu: Path):
     ],
 )
 def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, words):
-    """Where it does not come back, when its time is over."""
+    """An FMU that does not return is ended after a time limit."""
     waits = 0.5 if act in ("HANGS", "SPINS") else 20.0
     table = run_isolated(foreign_system(c_fmu, act, at=0.1), waits)
     assert table.failure is not None
@@ -218,7 +218,7 @@ def test_isolated_runs_in_several_threads(c_fmu: Path):
 
 @pytest.mark.parametrize("loop", LOOPS)
 def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: str):
-    """A run that ends while another one goes on takes no messages with it, nor the process."""
+    """A run that ends during another one takes neither its messages nor the process."""
     begun, go_on = threading.Event(), threading.Event()
 
     class Waits(Table):
@@ -348,7 +348,7 @@ def test_an_alarm_ends_a_run_with_its_rows(archives, workplace, loop):
     ],
 )
 def test_what_a_python_slave_does_to_the_interpreter_costs_no_rows(workplace, act):
-    """As often as it is told to do so; what is written and said is written and said."""
+    """Although it does so in every step, the result and its messages are written."""
     (workplace / "slave").mkdir()
     system = System("slave", {"a": read_component("a", build_slave(workplace, act))}, ())
     write_ssp(system, workplace / "slave")
@@ -363,7 +363,7 @@ def test_what_a_python_slave_does_to_the_interpreter_costs_no_rows(workplace, ac
 
 @pytest.mark.parametrize("loop", LOOPS)
 def test_an_fmu_finds_the_current_folder_that_it_has_left(workplace, loop):
-    """However often this program looks after its files; and the user finds that of before."""
+    """The program may change the folder meanwhile; the user's own one is restored."""
     act = "(current_time < 0.13 and os.chdir('/')) or (os.getcwd() == '/') or 1 / 0"
     system = System("slave", {"a": read_component("a", build_slave(workplace, act))}, ())
     assert len(whole(system, Experiment(200 * STEP, STEP), loop)) == 201
@@ -404,7 +404,7 @@ def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, ma
     assert list(temporary.iterdir()) == []
 
 
-def test_an_fmu_that_ended_fatally_is_loaded_anew(archives: Path):
+def test_an_fmu_that_ended_fatally_is_loaded_again(archives: Path):
     """The C library remembers, as any may, that it must not be called."""
     [archive] = (archives / "FATAL").iterdir()
     code = (

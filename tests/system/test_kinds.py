@@ -42,7 +42,7 @@ def both(
     experiment: Experiment,
     values: dict[str, object] | None = None,
 ) -> Outcome:
-    """What a run comes to on either kind of FMUs."""
+    """The outcome of a run, which is the same on both kinds of FMUs."""
     ours, theirs = (
         outcome(folder, scenario, values or {}, experiment) for folder in (dist, native)
     )

@@ -64,14 +64,14 @@ CHANGES: list[dict[str, Any]] = [
 
 
 class Parts(NamedTuple):
-    """What the page is made of, as files."""
+    """Parts of the page, as files."""
 
     engine: Path
     modules: list[Path]
     data: Path
 
     def node(self, script: str, *arguments: str, given: str = "") -> Any:
-        """What a script of the tests says, that takes them first."""
+        """Run a script of the tests, which takes the parts first, and return its output."""
         modules = ",".join(map(str, self.modules))
         parts = (str(self.engine), modules, str(self.data))
         command = ["node", str(SCRIPTS / script), *parts, *arguments]
@@ -88,7 +88,7 @@ def parts(script: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
 
 
 def made(engine: Path, opened: str, folder: Path, alone: bool = False) -> Parts:
-    """The parts of a page, with the scenario that it opens alone or with all."""
+    """The parts of a page, with all scenarios or only the one that it opens."""
     data, programs = page_data(opened)
     if alone:
         data["presets"] = [one for one in data["presets"] if one["name"] == data["opened"]]
@@ -119,7 +119,7 @@ def opened(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bro
     "name", [*REPRESENTATIVES, *slow(*(name for name in names() if name not in REPRESENTATIVES))]
 )
 def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, parts: Parts, tmp_path):
-    """Those of a scenario and of what it is compared with."""
+    """For a scenario and its companion."""
     outcomes = rows_of(parts, name, tmp_path)
     for i, run in enumerate(map(compiled, runs_of(name))):
         table, outcome = Table(), outcomes[f"{name}.{i}"]
@@ -170,7 +170,7 @@ def compare_indices(run: Prepared, table: Table, found: np.ndarray, said: Any, n
 
 
 def places(table: Table) -> list[int]:
-    """Where a row has what a program has, too: all but whether an FMU fails."""
+    """Columns that a program has, too: all except `fault`."""
     return [0, *(i for i, name in enumerate(table.columns, 1) if not name.endswith(".fault"))]
 
 
@@ -248,7 +248,7 @@ def test_vehicles_have_any_names_and_may_have_no_controller(parts: Parts, tmp_pa
 
 
 def both(text: str, parts: Parts, folder: Path) -> tuple[Any, Prepared]:
-    """What a scenario's run in Node says, and the run itself."""
+    """Run a scenario in Node, and prepare it for the master."""
     scenario = folder / "mine.toml"
     scenario.write_text(text)
     said = made(parts.engine, str(scenario), folder, alone=True).node("rows.mjs", str(folder))
@@ -267,14 +267,14 @@ def compare(run: Prepared, said: Any, folder: Path) -> tuple[Ending, Table]:
 
 
 def test_a_state_that_a_guard_starts_over_is_told(parts: Parts, tmp_path):
-    """Of an observer that restarts; what an FMU says again after a reset is not."""
+    """An observer restarts."""
     gate = "stop_time = 2.0\n[parameters]\ncontroller.innovation_gate = 1e-6\n"
     said, run = both(gate, parts, tmp_path)
     [message] = run.run([]).messages
     assert said["messages"] == [message]
 
 
-#: Scenarios with what only programs of their own have.
+#: Scenarios that need a program of their own.
 OTHERS = {
     "slow, in another order": (
         'stop_time = 5.0\norder = "gauss-seidel"\n[steps]\ncontroller = 0.04\nplanner = 0.1\n'
@@ -402,7 +402,7 @@ def test_page_has_the_licence_of_each_thing_in_it(page: Path):
 
 
 def test_page_opens_a_file_of_the_users(tmp_path, opened: Browser):
-    """With events of its own, which the scenarios of the list can have as well."""
+    """With events of its own, which the scenarios of the list can also have."""
     scenario = tmp_path / "mine.toml"
     scenario.write_text(
         'title = "Mine <b>"\n[parameters]\nplant.noise.std = 0.0\n[[events]]\nat = 0.2\n'

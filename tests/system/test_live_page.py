@@ -33,7 +33,7 @@ CSV = "auvfmu.csv()"
 #: WebGL without a graphics card.
 SOFTWARE_GL = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
-#: How long something that is waited for may take [s].
+#: Time limit of a wait [s].
 PATIENCE = 90.0
 
 #: Numbers of keys, and what they write.
@@ -145,7 +145,7 @@ def test_link_opens_the_same_run(opened):
     assert opened.run(f"{EVENT}.value") == "20"
 
 
-#: What is copied and downloaded stays in the page.
+#: Copies and downloads stay in the page.
 CATCH = (
     "navigator.clipboard.writeText = async (text) => { globalThis.copied = text; };"
     "URL.createObjectURL = (blob) => { globalThis.saved = blob; return 'blob:'; };"
@@ -187,7 +187,7 @@ def live_of(chromium, folder, text) -> Live:
 
 
 def compare_rows(opened, tmp_path):
-    """Copy the command, type it into a shell, and compare its rows with what is downloaded."""
+    """Copy the command, type it into a shell, and compare its rows with the download."""
     opened.run(CATCH)
     opened.run("document.getElementById('copy-command').click()")
     opened.run("document.getElementById('download').click()")
@@ -217,7 +217,7 @@ def test_value_that_is_refused_is_marked_and_nothing_else_changes(opened):
     assert opened.run(TABLE) == table
 
 
-def test_what_is_no_number_is_refused_where_it_was_typed(opened):
+def test_a_text_that_is_not_a_number_is_refused_where_it_was_typed(opened):
     opened.run(CATCH)
     text = "1,000,5"
     field = "document.querySelector('#groups input[data-name=\"controller.k_d\"]')"
@@ -300,7 +300,7 @@ def test_a_chart_that_comes_into_sight_shows_the_time_that_the_others_show(opene
         assert share == pytest.approx(20.0 / end, abs=0.02), part
 
 
-def test_remark_says_that_its_numbers_are_those_of_the_preset(opened):
+def test_remark_says_that_its_numbers_belong_to_the_preset(opened):
     head = "document.getElementById('remark-head').hidden"
     faded = "document.querySelector('.outdated') !== null"
     assert opened.run(f"[{head}, {faded}]") == [True, False]
@@ -381,7 +381,7 @@ def test_sliders_have_names_of_their_own(opened):
     assert len(names) == len(set(names)) > 20
 
 
-def test_presets_leave_nothing_behind(opened):
+def test_presets_leave_no_listeners(opened):
     def listeners() -> int:
         found = opened.call(
             "Runtime.evaluate",
@@ -436,7 +436,7 @@ def test_all_vehicles_are_shown_and_one_is_chosen(opened):
 
 
 def test_command_makes_the_same_rows_of_several_vehicles(opened, tmp_path):
-    """Of the comparison, which has no scenario of its own and one link fewer than vehicles."""
+    """The comparison has no scenario of its own and one link fewer than vehicles."""
     opened.run('auvfmu.set({preset: "formation-lost-link", stop_time: 5, hide: "proposed"})')
     compare_rows(opened, tmp_path)
 

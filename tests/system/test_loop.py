@@ -68,7 +68,7 @@ def run(
 
 
 def same(system: System, experiment: Experiment, events: Sequence[Event] = ()) -> Table:
-    """What both loops make of a run."""
+    """A run, which is the same in both loops."""
     python, compiled = (run(system, experiment, loop, events) for loop in LOOPS)
     assert compiled.rows.tobytes() == python.rows.tobytes()
     assert compiled.ending == python.ending
@@ -125,7 +125,7 @@ PAIR = {
 
 
 def pair(folder: Path, act: str, call: str = "STEP", milliseconds: int = 0) -> System:
-    """The two, of which the first misbehaves in its seventh step."""
+    """The two; the first misbehaves in its seventh step."""
     values = {"act": ACTS[act], "call": CALLS[call], "at": 7, "milliseconds": milliseconds}
     return system_of(folder, **PAIR, parameters={f"bad.{k}": v for k, v in values.items()})
 
@@ -155,7 +155,7 @@ def test_a_step_that_fails_is_named_and_the_rows_before_it_kept(
     assert table.ending.messages == (("bad: step 7", "bad: tired") if act == "SAYS" else ())
 
 
-#: Of the first an Integer and a Real feed the second, whose outputs are finite whatever it takes.
+#: An Integer and a Real of the first feed the second, whose outputs are finite for any inputs.
 FED = {
     "shapes": {"a": Shape((1, 0, 0, 0), (1, 1, 0, 0)), "b": Shape((1, 1, 0, 0), (0, 1, 0, 0))},
     "connections": {"b.input.Real0": "a.output.Real0", "b.input.Integer0": "a.output.Integer0"},
@@ -191,8 +191,8 @@ def test_an_input_that_its_type_cannot_hold_ends_the_run(
     assert mentions(table.failure, words)
     assert np.isfinite(table.rows).all()
     assert table.failure.startswith(f"stopped at t = {len(table) * H:g} s: ")
-    # The row that shows it is that of its time, or that of the end of the step; that an integer
-    # is too large is seen where it is set, after the row.
+    # The row of its time, or of the end of the step, shows it; an integer is too large when it is
+    # set, after the row.
     at_once = order == "feedthrough" and "Integer" not in words
     assert len(table) == 7 - at_once if target else 7 < len(table) < 400
 

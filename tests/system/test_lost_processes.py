@@ -36,7 +36,7 @@ seed = 7
 
 
 def sweep(out):
-    """A sweep of its own, which nothing of this process reaches."""
+    """A sweep in a session of its own."""
     means = ("--kind", "native", "--workers", "2", "--out", out)
     return subprocess.Popen(
         [sys.executable, "-m", "orchestrator", "sweep", "study.toml", *means],
@@ -48,7 +48,7 @@ def sweep(out):
 
 
 def rows(out):
-    """How many runs are kept; the process that keeps them lets nobody else read."""
+    """Number of kept runs, from a copy: the process that keeps them locks the file."""
     with TemporaryDirectory() as copy:
         for file in out.glob(f"{DATABASE}*"):
             # It may be gone meanwhile.

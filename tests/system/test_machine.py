@@ -112,7 +112,7 @@ def test_full_disk_at_any_stage(workplace, capsys, size):
 
 
 def test_no_room_for_the_folder_of_a_companion(workplace, capsys, monkeypatch):
-    """What is compared with it stays, with its record."""
+    """The first run stays, with its record."""
     mkdir = Path.mkdir
 
     def full(path: Path, *arguments: Any, **options: Any) -> None:
@@ -157,7 +157,7 @@ def test_limit_of_the_size_of_files_is_like_a_full_disk(workplace):
 
 
 def test_short_memory_is_said_and_loses_no_rows(workplace):
-    """Python and numpy alone need 150 MB of address space, figures 300."""
+    """Python and numpy need 150 MB of address space, figures 300."""
     limit = {resource.RLIMIT_AS: 235 * 10**6}
     status, said = called("run", "fig4", "--stop-time", "1", limits=limit)
     assert status in (1, 2)
@@ -206,7 +206,7 @@ def test_no_home_and_no_temporary_folder(workplace):
 
 
 def under_way(folder: Path) -> bool:
-    """Whether rows are on their way into a folder."""
+    """True if a run writes rows into a folder."""
     return any(path.stat().st_size > 1e5 for path in folder.glob(".auv-fmu-*/result.csv"))
 
 
@@ -310,7 +310,7 @@ def test_the_end_of_the_terminal_means_nothing_under_nohup(workplace):
 
 
 def busy(process: subprocess.Popen[str], temporary: Path) -> bool:
-    """Whether a process has children, which have begun to write temporary files."""
+    """True if a process has children, which have begun to write temporary files."""
     return len(members(process.pid)) > 1 and any(temporary.glob("auvfmu-*/*/*"))
 
 

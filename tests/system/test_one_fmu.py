@@ -1,4 +1,4 @@
-"""A whole system as one FMU: it has the numbers of a run, in fmpy and in our master."""
+"""A whole system as one FMU: the numbers of a run, in fmpy and in the master."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ H, STEPS = 0.02, 120
 
 SCENARIOS = ("fig4", "sea", *slow("formation-v", "remus"))
 
-#: What is open in all of these, and what a host drives it with.
+#: Values for an input that is open in all of these.
 WAVE = "time,plant.water.x\n" + "".join(f"{H * k!r},{0.3 * sin(k)!r}\n" for k in range(STEPS))
 
 
@@ -53,7 +53,7 @@ def made(name: str, *options: str) -> tuple[str, bytes]:
 
 
 def exported(name: str, *options: str) -> Path:
-    """The FMU of a scenario in the current folder; that of a ready one is made once."""
+    """The FMU of a scenario in the current folder; the FMU of a ready one is made once."""
     if name.endswith(".toml"):
         return export(name, *options)
     file, content = made(name, *options)
@@ -72,7 +72,7 @@ def outputs(path: Path) -> list[str]:
 
 
 def check(found: Any, result: Result, names: list[str]) -> None:
-    """Hold columns against those of a run, bit for bit."""
+    """Compare columns with a run, bit for bit."""
     assert len(names) > 50
     assert len(result) == STEPS + 1
     for name in names:
@@ -162,7 +162,7 @@ def test_in_our_master_it_is_a_component_with_the_same_bits(workplace: Path):
 
 
 @pytest.mark.parametrize("order", ["jacobi", *slow("gauss-seidel")])
-def test_orders_and_longer_steps_are_those_of_the_scenario(workplace: Path, order: str):
+def test_orders_and_longer_steps_follow_the_scenario(workplace: Path, order: str):
     Path("slow.toml").write_text(
         f'title = "Slow"\nstop_time = {STEPS * H}\norder = "{order}"\n[steps]\ncontroller = 0.04\n'
         "disturbance = 0.06\n"
@@ -175,11 +175,11 @@ def test_orders_and_longer_steps_are_those_of_the_scenario(workplace: Path, orde
         it.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.03)
 
 
-def test_a_longer_step_is_split_into_those_of_the_scenario(workplace: Path):
+def test_a_longer_step_is_split(workplace: Path):
     path = exported("fig4")
     long, short = play(path, 4 * H), play(path)
     for name in outputs(path):
-        # The time is not that of a host that counts steps.
+        # The host computes times by additions, not from the number of the step.
         np.testing.assert_allclose(long[name], short[name][::4], 1e-9, 1e-9, err_msg=name)
 
 
@@ -221,7 +221,7 @@ def is_tunable(path: Path, name: str) -> bool:
 
 
 @pytest.mark.parametrize(("name", "fmi"), [("fig4", "2"), *slow(("formation-v", "3"))])
-def test_a_state_is_all_that_the_rest_depends_on(workplace: Path, name: str, fmi: str):
+def test_a_state_determines_the_rest_of_the_run(workplace: Path, name: str, fmi: str):
     path = exported(name, "--fmi", fmi)
     references = real_outputs(path)
     with slaves(path, 2) as [one, other]:
@@ -253,7 +253,7 @@ def test_a_controller_of_ones_own_goes_with_it(workplace: Path):
     check(play(path), result, outputs(path))
 
 
-def test_its_variables_are_those_of_the_components(workplace: Path):
+def test_its_variables_match_the_components(workplace: Path):
     path = exported("fig4", "--set", "plant.noise.std=0")
     system = load("fig4").with_parameters({"plant.noise.std": 0.0})
     found = {one.name: one for one in fmpy.read_model_description(str(path)).modelVariables}
@@ -306,7 +306,7 @@ def test_what_is_wrong_says_which_component_and_why(workplace: Path):
     assert mentions(str(result.failure), "plant: state finite")
 
 
-def test_terminals_are_those_of_the_components(workplace: Path):
+def test_terminals_match_the_components(workplace: Path):
     path = exported("sea", "--fmi", "3")
     with zipfile.ZipFile(path) as archive:
         root = ElementTree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
@@ -323,7 +323,7 @@ def test_its_bytes_depend_on_nothing_else(workplace: Path):
     assert exported("fig4").read_bytes() == export("fig4", out="again").read_bytes()
 
 
-def test_what_cannot_be_one_fmu_is_refused_by_name(workplace: Path, refused):
+def test_a_system_that_cannot_be_one_fmu_is_refused_by_name(workplace: Path, refused):
     assert main(["new", "controller", "other_law", "--python"]) == 0
     said = refused("export", "other_law/other_law.toml", "--format", "fmu", "--out", "none")
     assert mentions(said, "controller language")

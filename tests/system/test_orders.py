@@ -22,7 +22,7 @@ from support.relay import relay, system_of
 from support.runs import whole as run
 from support.texts import mentions
 
-#: Step [s], of which all multiples are exact.
+#: Step [s]; all multiples are exact.
 H = 0.125
 
 
@@ -48,7 +48,7 @@ def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder
     line = "a takes c.g one step late: direct feedthroughs form a ring"
     assert ending.messages == (line, *(f"{name}: initialises" for name in "abc"))
     assert arrange(system, "gauss-seidel").stages == [["a"], ["b"], ["c"]]
-    # What closes the ring is a step old, everything else is new.
+    # The value that closes the ring is a step old, every other is new.
     np.testing.assert_array_equal(table["a.u"][1:], table["c.g"][:-1])
     np.testing.assert_array_equal(table["b.u"][1:], table["a.g"][1:])
     np.testing.assert_array_equal(table["c.u"][1:], table["b.g"][1:])
@@ -77,7 +77,7 @@ def test_strict_wants_rings_solved_unless_something_else_is_stated(folder):
 
 @pytest.mark.parametrize("order", ["gauss-seidel", *permutations(("plant", "controller"))])
 def test_an_order_of_names_is_the_derived_one_where_it_says_the_same(order):
-    """Where what the controller and the disturbance show at once goes is what counts."""
+    """The order counts where outputs follow inputs at once."""
     system, experiment = load("fig4", NATIVE), Experiment(2.0, 0.02, "gauss-seidel")
     derived = run(system, experiment)
     if order == "gauss-seidel":
@@ -97,7 +97,7 @@ def test_isolated_components_have_steps_of_their_own_too(folder):
     assert apart.rows.tobytes() == run(system, experiment).rows.tobytes()
 
 
-def test_steps_follow_from_what_is_stated_and_else_from_the_fmus(folder):
+def test_steps_follow_from_the_request_and_otherwise_from_the_fmus(folder):
     fmus = {"a": relay(folder, step=0.02), "b": relay(folder, step=0.05), "c": relay(folder)}
     system = system_of(fmus, stop_time=1.0)
 

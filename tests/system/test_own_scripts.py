@@ -19,7 +19,7 @@ from orchestrator.machine.compilers import machines_compiler
 from support.own import write
 from support.texts import mentions
 
-#: Packages that controllers of researchers use, as far as they are installed.
+#: Packages that controllers of researchers use, if they are installed.
 PACKAGES = [
     name
     for name in ("numpy", "scipy.optimize", "pandas", "matplotlib.pyplot", "casadi")
@@ -83,7 +83,7 @@ def own(built: Path, workplace: Path) -> Path:
 
 
 def test_a_script_runs_with_the_packages_of_researchers(workplace: Path):
-    """They are those of the host, and not in the FMU."""
+    """The packages belong to the host, and are not in the FMU."""
     text = SLAVE.replace("import folder.inner, \\\n    math", IMPORTS).replace(
         "if True: import beside", ""
     )
@@ -99,7 +99,7 @@ def test_a_script_runs_with_the_packages_of_researchers(workplace: Path):
     }  # fmt: skip
 
 
-def test_a_script_runs_with_all_that_it_imports_and_reads_in_its_folder(own: Path):
+def test_a_script_runs_with_its_modules_and_data_files(own: Path):
     with zipfile.ZipFile("Own.fmu") as archive:
         names = {re.sub(r"_[0-9a-f]{12}", "", name) for name in archive.namelist()}
     assert {name.removeprefix("resources/") for name in names} >= {*FILES} - {"data/unused.txt"}
@@ -161,7 +161,7 @@ def change(name: str) -> Callable[[], object]:
     return lambda: Path(name).write_bytes(Path(name).read_bytes() + b"\n")
 
 
-#: What is done after a build, and the file that is then named.
+#: Changes after a build, and the file that is then named.
 CHANGES = {
     "ends of lines": (
         lambda: Path("beside.py").write_bytes(
@@ -242,5 +242,5 @@ def test_strict_refuses_an_fmu_that_is_older_than_its_script(own: Path, capsys):
         b'{"fmu": "a", "kind": "b", "folder": 1, "script": 2, "digests": []}',
     ],
 )  # fmt: skip
-def test_a_record_that_is_none_of_ours_is_passed_over(content: bytes):
+def test_a_foreign_record_is_ignored(content: bytes):
     assert origin_of(content) is None

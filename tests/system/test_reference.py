@@ -64,7 +64,7 @@ def test_own_table_of_another_step_is_verified_with_that_step(workplace, capsys)
     assert tells(capsys.readouterr().out, (70, 70, 0, 34, 0.03, 1))
 
 
-def test_table_of_one_fmu_is_told_from_that_of_a_system(system: System, tmp_path: Path):
+def test_table_of_one_fmu_is_distinguished_from_a_systems(system: System, tmp_path: Path):
     """Most of its columns are the plant's; others have a `fault`, too."""
     path = tmp_path / "table.csv"
     path.write_text("time,fault,eta.x[REAL], y.x\n0,false,2,2\n1,false,2,2\n")
@@ -184,7 +184,7 @@ class OtherTool:
 def test_table_of_a_tool_that_reads_outputs_after_it_has_passed_them_on_is_certified(
     native: Path, tmp_path: Path
 ):
-    """The others step with what they had before, as PyFMI and ecos do."""
+    """The others step with earlier values, as PyFMI and ecos do."""
     path, system = tmp_path / "table.csv", closed_loop(native)
     tool, rows = OtherTool(system, "full"), []
     for k in range(200):
@@ -203,11 +203,11 @@ def test_table_of_a_tool_that_reads_outputs_after_it_has_passed_them_on_is_certi
 def test_table_of_a_tool_that_follows_feedthrough_is_certified_before_and_after_it_does(
     native: Path, tmp_path: Path
 ):
-    """OMSimulator writes both rows, of which the first counts."""
+    """OMSimulator writes both rows; the first counts."""
     path, system = tmp_path / "table.csv", closed_loop(native)
     tool, before, after = OtherTool(system, "full"), [], []
     for k in range(200):
-        # What comes round is there after as many exchanges as there are components.
+        # Values have come round after as many exchanges as there are components.
         for name in ORDER * len(ORDER):
             tool.set(name)
             tool.read(name)
@@ -326,7 +326,7 @@ def test_table_with_another_separator_and_a_byte_order_mark_is_read(
     assert tells(verify(path, system, 1e-9), (200, 0.02, 4))
 
 
-def test_what_was_not_compared_is_named(system: System, tmp_path: Path):
+def test_columns_that_were_not_compared_are_named(system: System, tmp_path: Path):
     """The row at the start, inputs, parameters, what looks like a port, and what is missing."""
     rows = cells(COMMITTED / "auv_ref.csv")[:102]
     keep = [rows[0].index(name) for name in ("time", "plant.eta.x", "plant.tau.u", "plant.y.z")]

@@ -23,7 +23,7 @@ from support.texts import mentions
 _FOLDER = Path(os.environ.get("REFERENCE_FMUS", ""))
 _MODELS = ("BouncingBall", "Dahlquist", "Feedthrough", "Resource", "Stair", "VanDerPol")
 
-#: Of outputs in the results, these are left alone, or FMI 2.0 does not have them.
+#: Outputs that the master does not take, and outputs that FMI 2.0 has.
 _LEFT_OUT = ("Binary_output",)
 _OF_FMI_2 = (
     "Float64_continuous_output", "Float64_discrete_output", "Int32_output", "Boolean_output",

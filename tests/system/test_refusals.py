@@ -1,4 +1,4 @@
-"""What a command refuses it refuses in one line with status 2, and it leaves nothing behind."""
+"""Commands refuse bad input in one line with status 2, and write nothing."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ KINDS = (
     "below a file", "without permission",
 )  # fmt: skip
 
-#: Texts that are no good, by the names of their files.
+#: Bad texts, by the names of their files.
 TEXTS = {
     "arrays.toml": f"only = {'[' * 5000}{']' * 5000}",
     "bool.toml": "stop_time = true",
@@ -63,7 +63,7 @@ def workplace(workplace: Path) -> Path:
 
 
 def bad_file(kind: str, ending: str) -> str:
-    """The name of a file that is no good."""
+    """Make a bad file, and return its name."""
     path = Path(f"bad.{ending}")
     if kind == "folder":
         path.mkdir()

@@ -34,7 +34,7 @@ from support.settings import NAMES, REPRESENTATIVES, WITH_INPUTS
 
 ROOT = Path(__file__).parents[2]
 
-#: How libraries begin, and numbers of processors by the names of FMI 3.0: elf.h, the format of PE,
+#: First bytes of libraries, and numbers of processors by the names of FMI 3.0: elf.h, the format of PE,
 #: and Apple's mach/machine.h.
 ELF, PE, MACH_O, UNIVERSAL = b"\x7fELF\x02\x01", b"PE\0\0", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"
 PROCESSORS = {
@@ -58,19 +58,19 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
     )
     [wheel] = wheels.iterdir()
     subprocess.run([*pip, "install", "--no-deps", "--target", packages, wheel], check=True)
-    # The packages of the wheel come before those of this environment.
+    # Packages of the wheel come before the environment's.
     environment = {**os.environ, "PYTHONPATH": str(packages)}
     where = subprocess.run(
         [sys.executable, "-P", "-c", "import fmus, orchestrator; print(orchestrator.__file__)"],
         env=environment, cwd=empty, check=True, capture_output=True, text=True,
     )  # fmt: skip
     assert where.stdout.startswith(str(packages))
-    # What the report takes from pages is in the wheel, and names no test, of which it has none.
+    # Pages that the report needs are in the wheel; they name no test, since it has no tests.
     assert {path.name for path in packages.rglob("pages/*.md")} == {"paper.md", "readings.md"}
     for path in packages.rglob("*.*"):
         assert path.suffix not in (".md", ".py", ".toml") or b"tests/" not in path.read_bytes()
     command = [sys.executable, "-P", "-m", "orchestrator", "run", "fig4"]
-    # The second has all that a translation to C needs.
+    # The second needs everything for a translation to C.
     for options in ([], ["--kind", "native", "--no-figures", "--out", "results/native"]):
         subprocess.run(
             [*command, "--stop-time", "1", *options],

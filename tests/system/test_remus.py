@@ -84,7 +84,7 @@ def test_a_run_is_measured_drawn_and_read_again(tmp_path, capsys):
 
 
 def test_commands_are_measured_where_the_allocation_takes_them():
-    """An actuator that is lost is lost between controller and allocation."""
+    """A lost actuator is missing between controller and allocation."""
     lost = [{"at": 0.0, "lose": "controller.tau.u"}]
     found = simulate("remus", kind="native", stop_time=2.0, events=lost)
     assert found.metrics()["peak_command"][0] == 0.0

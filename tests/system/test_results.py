@@ -1,4 +1,4 @@
-"""What a run leaves behind, however long it is and however it ends."""
+"""Results of runs of any length and with any end."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_interval_and_columns_choose_from_the_same_numbers():
     assert kept == (*(f"plant.y.{k}" for k in "xyz"), *(f"controller.tau.{k}" for k in "uqr"))
     places = [0, *(1 + columns.index(name) for name in kept)]
     assert np.array_equal(rows("some/result.csv"), whole[::25, places])
-    # Indices are those of all steps, whatever is kept.
+    # Indices use all steps, whichever are kept.
     assert Path("some/metrics.json").read_text() == Path("all/metrics.json").read_text()
     outputs = ["--stop-time", "0.1", "--no-figures", "--columns", "outputs", "--out", "outputs"]
     assert main(["run", "fig4", *outputs]) == 0
@@ -68,7 +68,7 @@ def test_parquet_holds_the_same_numbers():
 
 
 def with_another_content(fmu: Path) -> None:
-    """Rewrite an FMU in its place, so that neither its name, inode, size nor time tells."""
+    """Overwrite an FMU; its name, inode, size and time stay."""
     before = fmu.stat()
     build(fmu.parent, change=('modelName="Others"', 'modelName="Theirs"'))
     os.utime(fmu, ns=(before.st_atime_ns, before.st_mtime_ns))
@@ -85,7 +85,7 @@ def replace_by_another(fmu: Path) -> None:
 
 @pytest.mark.parametrize("change", [replace_by_another, with_another_content, Path.unlink])
 def test_record_names_the_fmu_that_ran(workplace: Path, change: Callable[[Path], object]):
-    """Whatever becomes of the file after it was read, and during the run."""
+    """Whatever happens to the file after it was read, and during the run."""
     fmu = build(workplace)
     digest = hashlib.sha256(fmu.read_bytes()).hexdigest()
     system = system_of(fmu)
@@ -137,7 +137,7 @@ def test_record_tells_by_its_identity_whether_numbers_are_the_same():
 
 
 def peak_memory(*arguments: str) -> int:
-    """Of a run on the command line [bytes]."""
+    """Peak memory of a run on the command line [bytes]."""
     process = subprocess.Popen(
         [sys.executable, "-P", "-m", "orchestrator", "run", "fig4", *arguments],
         stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,

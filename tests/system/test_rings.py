@@ -62,7 +62,7 @@ def test_static_rings_are_solved_in_every_row_whatever_their_gain(folder, k, l, 
 
 
 def test_a_ring_through_our_controller_is_solved_without_a_step(folder, dist: Path):
-    """What it measures follows its own command, 50 times too much for going round in circles.
+    """Its measurement follows its own command; the gain is 50 times too large for iteration.
 
     FMPy gives it alone what the ring has come to, and gets its commands after the step.
     """
@@ -108,7 +108,7 @@ def test_both_loops_and_isolation_make_the_same_rows(folder, coupling):
         assert other.rows.tobytes() == table.rows.tobytes()
 
 
-def test_a_ring_of_components_that_is_none_of_ports_is_no_step_late(folder):
+def test_a_ring_of_components_without_a_ring_of_ports_is_not_late(folder):
     """Each output follows one input only, and the FMU says that both follow both."""
     passes = Part(D=np.eye(2))
     parts = {"s": SINE, "a": passes, "b": passes}
@@ -138,7 +138,7 @@ def test_what_hangs_on_a_ring_takes_its_new_outputs(folder):
 )
 @pytest.mark.parametrize("names", ["abs", "sba"])
 def test_of_two_solved_rings_neither_is_the_first(folder, names, order, taken):
-    """What b takes of a is no feedthrough, but new, wherever the two stand."""
+    """b takes a new value from a without feedthrough, in any order of the two."""
     itself = [[0.0, 0.0], [0.5, 1.0]]
     parts = {
         "a": Part(B=[[0.0, 1.0], [0.0, 0.0]], C=[[1.0, 0.0], [0.0, 0.0]], D=itself, x=[1.0, 0.0]),
@@ -215,7 +215,7 @@ class _Broken:
 
 
 @pytest.mark.parametrize("coupling", ["solve", "linear"])
-def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, coupling):
+def test_a_run_with_a_solved_ring_continues_from_its_checkpoint(folder, tmp_path, coupling):
     system, experiment = ring(folder, 1.0, -2.0), Experiment(3.0, H, coupling=coupling)
     whole, again = run(system, experiment), Table()
     kept = Checkpoints(tmp_path, {}, 1.0, resume=False)

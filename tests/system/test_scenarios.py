@@ -53,7 +53,7 @@ def run(native: Path) -> Runner:
 
 
 def variation(result: Table) -> np.ndarray:
-    """Of each actuator."""
+    """Total variation of each actuator."""
     return np.array(metrics_of(result).found()["total_variation"])
 
 
@@ -87,7 +87,7 @@ def test_fig3b_settles_on_a_helix(run: Runner):
     assert np.ptp(radius) < 0.01 * radius.mean()
 
 
-def test_smallest_turning_radius_is_that_of_the_printed_equations(dist: Path):
+def test_smallest_turning_radius_follows_from_the_printed_equations(dist: Path):
     """(2) at rest under 80 N and 80 N.m, solved by Newton's method: not the quoted 0.6 m."""
     m11, m22, d11, d22, d66 = 25.0, 17.5, 30.0, 30.0, 20.0
     u, v, r = 1.0, -0.5, 3.0
@@ -223,7 +223,7 @@ def test_certificates_agree_with_the_matrix_form_of_34(run: Runner):
 
 
 def test_composite_errors_end_in_a_small_ball(run: Runner):
-    """The theorem's claim, in numbers of ours: |r_1| < 0.2 m/s and |r_2| < 0.02 m/s after 40 s."""
+    """The theorem's claim in numbers: |r_1| < 0.2 m/s and |r_2| < 0.02 m/s after 40 s."""
     column = dict(
         zip(CERTIFICATE_COLUMNS, certificates(run("fig4", plant__noise__std=0.0)).T, strict=True)
     )

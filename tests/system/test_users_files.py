@@ -1,4 +1,4 @@
-"""Files of the user's beside those of the program, by name."""
+"""Files of the user's in the folders of the program."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_a_companion_of_any_name_has_a_folder_of_its_own(stem):
 
 @needs_npm
 @pytest.mark.usefixtures("script")
-def test_somebody_elses_result_is_read_and_no_more(capsys):
+def test_a_result_from_elsewhere_is_only_read(capsys):
     """It brings hidden folders, links, and a record that names the user's files."""
     assert main(RUN) == 0
     for path in Path("r").glob(".*"):

@@ -1,4 +1,4 @@
-"""Several vehicles in one system: each is measured and drawn as if it were alone."""
+"""Several vehicles in one system: each is measured and drawn like a single one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from support.pages import stored
 
 OTHER = Loop("tow", "pilot", "guide", "sea")
 
-#: What the second vehicle has otherwise, by the name that its component has when it is alone.
+#: Values of the second vehicle, by names of the standard loop.
 CHANGES = {
     "plant.eta0.y": 2.0, "plant.noise.seed": 7, "controller.eps_t": 30.0, "planner.tau_d.u": 12.0,
     "disturbance.A_f": 20.0,
@@ -46,7 +46,7 @@ def scenario(path: Path, components: dict[str, str], wires: dict, values: dict) 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """Both together, and the second one alone."""
+    """Both together, and each in a run of its own."""
     folder, standard = tmp_path_factory.mktemp("vehicles"), read_wiring()
     components = {ROLES[name]: fmu for name, fmu in standard["components"].items()}
     wires = {
@@ -67,12 +67,12 @@ def results(tmp_path_factory):
 def test_loops_are_found_by_ports_and_wires(results):
     assert loops_of(load(results / "two.toml", "native")) == (STANDARD, OTHER)
     assert loops_of(load("fig5-pd", "native")) == (STANDARD,)
-    # Alone, what it lacks has the standard name.
+    # Parts that a scenario lacks have their standard names.
     assert loops_of(load("fig3a", "native")) == (STANDARD,)
 
 
 @pytest.mark.parametrize(("alone", "name"), [("fig4", "plant"), ("one", "tow")])
-def test_each_vehicle_has_the_numbers_that_it_has_alone(results, alone, name):
+def test_each_vehicle_has_the_numbers_of_its_own_run(results, alone, name):
     def values(folder):
         return json.loads((results / folder / "metrics.json").read_text())
 
@@ -94,9 +94,9 @@ def test_each_vehicle_is_drawn(results):
             f"two-{name}{part}.{kind}" for part in ("", "-velocity") for kind in ("png", "svg")
         )
         assert names.issuperset(figures)
-    # Both together have one, and no second of what is of one vehicle.
+    # There is one figure of both together, and none of what belongs to one vehicle.
     assert "two.png" in names and "two-velocity.png" not in names
-    # What is drawn of one is not drawn of the other.
+    # The figures of the two differ.
     assert (
         len({(results / "two" / f"two-{name}.png").read_bytes() for name in ("plant", "tow")}) == 2
     )
@@ -127,7 +127,7 @@ def test_one_vehicle_of_a_fleet_has_the_numbers_of_the_single_loop():
     assert (of_fleet.rows == single.rows).all()
 
 
-def test_each_vehicle_of_a_fleet_has_the_numbers_that_it_has_alone():
+def test_each_vehicle_of_a_fleet_has_the_numbers_of_its_own_run():
     seeds = {"auv*.plant.noise.seed": {"first": 5, "step": 1}}
     three = simulate({"vehicles": 3, "parameters": seeds}, stop_time=1.0, kind="native")
     for number in (1, 2, 3):
@@ -186,7 +186,7 @@ def test_a_star_in_a_scenario_is_each_vehicle(fleet):
     assert loops_of(system)[1] == Loop("auv2.plant", "auv2.controller", "lead", "auv2.disturbance")
 
 
-def test_a_fleet_is_compared_with_another_controller_in_its_place(fleet, tmp_path):
+def test_a_fleet_is_compared_with_another_controller(fleet, tmp_path):
     pytest.importorskip("matplotlib")
     assert main(["run", str(fleet / "fleet.toml"), "--kind", "native", "--out", str(tmp_path)]) == 0
     columns = [

@@ -1,4 +1,4 @@
-"""FMUs of FMI 3.0 run as those of FMI 2.0 do, alone, among themselves, and with these."""
+"""FMUs of FMI 3.0: single, several, and together with FMUs of FMI 2.0."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def page_of(*runs: Drawn, metrics: dict[str, Any] | None = None, title: str = "r
     return view_page(title, [Stored(run, metrics or {}) for run in runs])
 
 
-def test_rows_are_those_of_the_run():
+def test_rows_equal_the_run():
     """All of them: exactly the times, and other columns within single precision."""
     table = loop_table()
     _, [columns] = stored(page_of(Drawn("run", table)))
@@ -94,7 +94,7 @@ def test_events_have_the_numbers_of_the_record():
     assert "refused. over." in page
 
 
-def test_indices_are_those_of_the_result():
+def test_indices_equal_the_result():
     metrics = {"final_error": [1.0, float("inf"), "x"], "parameters": {}, "scenario": "mine"}
     [loop] = stored(page_of(Drawn("run", loop_table()), metrics=metrics))[0]["loops"]
     assert loop["metrics"] == [{"final_error": [1.0, None, None]}]
@@ -105,7 +105,7 @@ def test_indices_are_those_of_the_result():
     assert loop["metrics"] == [together, {"final_error": [2.0], **together}]
 
 
-def test_what_is_missing_is_named_on_the_page():
+def test_missing_columns_are_named_on_the_page():
     text = page_of(Drawn("run", loop_table(without=STANDARD.theta_hat)))
     assert "estimated parameters skipped: no controller.theta_hat[1]" in text
     loops = fleet(3)
@@ -145,12 +145,12 @@ def test_titles_and_names_are_text_and_no_markup():
     assert stored(text)[0]["loops"][0]["vehicles"][0]["name"] == "<i>.auv1"
 
 
-# What a user types
+# On the command line
 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Results: of a comparison with an event, of three vehicles, and of a planner alone."""
+    """Results: of a comparison with an event, of three vehicles, and of a single planner."""
     folder = tmp_path_factory.mktemp("results")
     scenarios = {
         "both": 'label = "<b>"\nstop_time = 4.0\n'
@@ -278,7 +278,7 @@ def test_a_vehicle_is_chosen(results, tmp_path, chromium):
 
 @in_browser
 @pytest.mark.slow
-def test_charts_stand_alone_where_there_is_no_vehicle(results, tmp_path, chromium):
+def test_without_a_vehicle_there_are_only_charts(results, tmp_path, chromium):
     view(results / "alone", tmp_path / "page.html")
     shown = opened(chromium, tmp_path / "page.html").evaluate
     assert shown("document.getElementById('stage').hidden")
