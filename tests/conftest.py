@@ -23,7 +23,7 @@ from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import bundle
 from ready_wheel import write_fmus
 
-# A slow machine is no error, and the same tree gives the same result every time.
+# Slow machines pass, and the same tree gives the same result every time.
 settings.register_profile("patient", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("patient")
 # The same and more of them, beside the slow tests.
@@ -40,16 +40,16 @@ settings.register_profile(
 # For tests/fuzz/test_keeping.py: thousands of folders, and of files with a changed bit.
 settings.register_profile("attack", settings.get_profile("search"), max_examples=7150)
 
-# Where a shell has started the tests in the background, or nohup has, they ignore signals, and so
-# does all that they start.
+# Tests that a shell or nohup has started in the background ignore signals, and so do their
+# children.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if os.name == "posix":
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-#: What a reason says beside the name of what is missing.
+#: Words of a reason around the name of the missing thing.
 _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")
 
-#: Where pytest's cache keeps what was skipped.
+#: Key of the skipped tests in pytest's cache.
 _SKIPPED = "auv-fmu/skipped"
 
 
@@ -96,7 +96,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(shared: Path) -> None:
     """Keep FMUs that the tests build out of the user's cache; runs may share another one."""
-    # What that compiler has made of the C libraries takes minutes to make again.
+    # Compiled C libraries of that compiler take minutes to make again.
     os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(user_cache_path("zig", appauthor=False)))
     os.environ["XDG_CACHE_HOME"] = os.environ.get("TESTS_CACHE") or str(shared / "cache")
 

@@ -14,14 +14,14 @@ from typing import Any
 
 BROWSER = which("chromium") or which("chromium-browser") or which("google-chrome")
 
-#: Nothing of it asks the network for anything.
+#: With these it does not use the network.
 _OPTIONS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
     "--remote-debugging-pipe",
 )  # fmt: skip
 
-#: Where Chromium reads and writes what is said by its protocol.
+#: File descriptors of Chromium's protocol.
 _READS, _WRITES = 3, 4
 
 

@@ -31,8 +31,7 @@ GCC, ARM_GCC, QEMU = map(shutil.which, ("gcc", "arm-none-eabi-gcc", "qemu-system
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 needs_arm = pytest.mark.skipif(ARM_GCC is None, reason="arm-none-eabi-gcc is not installed")
 
-#: A board whose processor has single precision only, and what one of its programs begins with.
-BOARD = "mps2-an386"
+#: Options for a processor with single precision only.
 CORTEX_M = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
 SUPPORT = Path(__file__).parents[1] / "support"
 
@@ -135,7 +134,7 @@ def test_table_equals_a_run_bit_for_bit(programs: Path, name: str):
 @needs_gcc
 @pytest.mark.parametrize("name", SINGLE)
 def test_single_precision_has_no_double_and_the_same_motion(programs: Path, name: str):
-    """The friction follows the sign of velocities that are zero except for rounding: not compared."""
+    """Friction is not compared: it has the sign of velocities that are zero except for rounding."""
     steps = SCENARIOS[name]
     columns, rows = printed(programs / f"{name}-single", steps, "-Wdouble-promotion")
     text = sources(programs / f"{name}-single")[0].read_text(encoding="utf-8")
@@ -245,7 +244,15 @@ def test_microcontroller_gives_the_same_except_for_rounding(
     compile_c(ARM_GCC, *CORTEX_M, "-std=c99", "-O2", "-ffp-contract=off", f"-DSTEPS={steps}",
               "--specs=rdimon.specs", f"-T{SUPPORT / 'cortex_m.ld'}", SUPPORT / "cortex_m.c",
               *sources(programs / kind), "-o", tmp_path / "one.elf", "-lm")  # fmt: skip
-    command = [QEMU, "-M", BOARD, "-nographic", "-semihosting", "-kernel", tmp_path / "one.elf"]
+    command = [
+        QEMU,
+        "-M",
+        "mps2-an386",
+        "-nographic",
+        "-semihosting",
+        "-kernel",
+        tmp_path / "one.elf",
+    ]
     with table.open("wb") as file:
         subprocess.run([*map(str, command)], check=True, stdout=file, timeout=60)
     columns, rows = read_columns(table), np.vstack([*read_rows(table)])

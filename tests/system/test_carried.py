@@ -1,4 +1,4 @@
-"""Reference results inside FMUs: those of the project, and of FMUs that are written here."""
+"""Reference results inside FMUs, of the project and of FMUs that are written here."""
 
 from __future__ import annotations
 

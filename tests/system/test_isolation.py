@@ -8,7 +8,6 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -34,16 +33,13 @@ from orchestrator.machine.errors import InputError, StartError
 from orchestrator.runs.tables import read_rows
 from orchestrator.runs.wiring import closed_loop
 from support.foreign import build_c_fmu, build_raising_fmu, build_slave, foreign_system
-from support.machine import LOOPS, contents, start
+from support.machine import LOOPS, contents, eventually, start
 from support.runs import run_table, whole
 from support.texts import mentions
 from support.tiers import slow
 
 STEP = 0.02
 SHORT = Experiment(0.5, STEP)
-
-#: Damage to its process that a run survives.
-DOES_TO_THE_PROCESS = ("FORKS", "MOVES", "CLOSES_FILES", "ALARMS")
 
 
 @pytest.fixture(scope="module")
@@ -66,21 +62,17 @@ def mark(monkeypatch: pytest.MonkeyPatch) -> str:
     return mark
 
 
-def marked(mark: str) -> Iterator[Path]:
-    """Processes with a mark, by their folders in /proc."""
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            if mark.encode() in (process / "environ").read_bytes():
-                yield process
-
-
 def left_over(mark: str) -> list[Path]:
-    """Processes that are still there some seconds later."""
-    for _ in range(100):
-        if not (found := list(marked(mark))):
-            break
-        time.sleep(0.1)
-    return found
+    """Processes with a mark that are still there some seconds later, by their folders in /proc."""
+
+    def marked() -> Iterator[Path]:
+        for process in Path("/proc").glob("[0-9]*"):
+            with suppress(OSError):
+                if mark.encode() in (process / "environ").read_bytes():
+                    yield process
+
+    eventually(lambda: not list(marked()))
+    return list(marked())
 
 
 def run_isolated(system: System, timeout: float = 20.0) -> Table:
@@ -250,7 +242,7 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
 def archives(c_fmu: Path, raising: System, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The systems as SSPs, each in a folder named by what happens in it."""
     folder = tmp_path_factory.mktemp("archives")
-    acts = ("FATAL", "HANGS", "CRASHES", *DOES_TO_THE_PROCESS)
+    acts = ("FATAL", "HANGS", "CRASHES", "FORKS", "MOVES", "CLOSES_FILES", "ALARMS")
     systems = {act: foreign_system(c_fmu, act) for act in acts}
     for name, system in {**systems, "raises": raising}.items():
         (folder / name).mkdir()

@@ -34,8 +34,8 @@ from support.settings import NAMES, REPRESENTATIVES, WITH_INPUTS
 
 ROOT = Path(__file__).parents[2]
 
-#: First bytes of libraries, and numbers of processors by the names of FMI 3.0: elf.h, the format of PE,
-#: and Apple's mach/machine.h.
+#: First bytes of libraries, and numbers of processors by the names of FMI 3.0: from elf.h, the
+#: format of PE, and Apple's mach/machine.h.
 ELF, PE, MACH_O, UNIVERSAL = b"\x7fELF\x02\x01", b"PE\0\0", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"
 PROCESSORS = {
     ELF: {62: "x86_64-linux", 183: "aarch64-linux"},

@@ -94,7 +94,7 @@ def test_each_vehicle_is_drawn(results):
             f"two-{name}{part}.{kind}" for part in ("", "-velocity") for kind in ("png", "svg")
         )
         assert names.issuperset(figures)
-    # There is one figure of both together, and none of what belongs to one vehicle.
+    # There is one figure of both together, and none of the others.
     assert "two.png" in names and "two-velocity.png" not in names
     # The figures of the two differ.
     assert (
