@@ -104,13 +104,19 @@ def test_same_run_gives_the_same_files(workplace):
 
 
 def test_own_scenario_file_and_ssp_run_the_same_way(dist, workplace):
+    """A component of the user's takes the place of another."""
+    shutil.copy(dist / "PdController.fmu", "mine.fmu")
     (workplace / "mine.toml").write_text(
-        'title = "Mine"\nstop_time = 0.2\n[parameters]\nplant.noise.std = 0.0\n'
-        '"controller.K1[1]" = 12.0\n'
+        'title = "Mine"\nstop_time = 0.2\n[components]\ncontroller = "mine.fmu"\n'
+        '[wires]\n"controller.dy" = "plant.dy"\n'
+        '[parameters]\nplant.noise.std = 0.0\n"controller.K1[1]" = 12.0\n'
     )
     assert main(["run", "mine.toml", "--no-figures"]) == 0
-    values = json.loads((workplace / "results/mine/metrics.json").read_text())
+    folder = workplace / "results" / "mine"
+    values = json.loads((folder / "metrics.json").read_text())
     assert values["parameters"] == {"controller.K1[1]": 12.0, "plant.noise.std": 0.0}
+    header = (folder / "result.csv").read_text().splitlines()[0]
+    assert "controller.dy.x" in header and "controller.y_hat.x" not in header
     archive = str(dist / "auv.ssp")
     assert main(["run", archive, "--stop-time", "0.2", "--no-figures", "--out", "from_ssp"]) == 0
     assert (workplace / "from_ssp" / "result.csv").is_file()
@@ -132,18 +138,6 @@ def test_comparison_runs_both_and_changes_both_where_both_have_it(workplace):
     assert proposed["velocities_reaching_controller"] == []
     assert pd["velocities_reaching_controller"] == ["plant.dy.x", "plant.dy.y", "plant.dy.z"]
     assert (pd["parameters"]["planner.eta0.z"], pd["stop_time"]) == (-60.0, 0.2)
-
-
-def test_own_component_takes_the_place_of_another(dist, workplace):
-    shutil.copy(dist / "PdController.fmu", "mine.fmu")
-    (workplace / "mine.toml").write_text(
-        'stop_time = 0.2\n[components]\ncontroller = "mine.fmu"\n'
-        '[wires]\n"controller.dy" = "plant.dy"\n'
-    )
-    assert main(["run", "mine.toml", "--no-figures"]) == 0
-    header = (workplace / "results/mine/result.csv").read_text().splitlines()[0]
-    assert "controller.dy.x" in header
-    assert "controller.y_hat.x" not in header
 
 
 @pytest.mark.parametrize("name", ["fig3a", *slow("fig3b", "fig6")])

@@ -30,9 +30,6 @@ from orchestrator.runs.scenario import Inputs, read_inputs
 from support.others import WAYS, build, run, system_of
 from support.texts import mentions, tells
 
-#: Outputs by the inputs that they repeat.
-_PASSED = {"u": "y", "mode": "mode_y", "on": "fault", "said": "heard"}
-
 EVERY_WAY = pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
 HERE = pytest.mark.parametrize(
     "way", [WAYS["python"], WAYS["compiled"]], ids=["python", "compiled"]
@@ -71,23 +68,6 @@ def test_an_input_that_nothing_feeds_keeps_what_the_fmu_begins_with(tmp_path, wa
     assert (table["a.u"] == 101325.0).all()
     assert (table["a.y"] == 101325.0).all()
     assert (table["a.mode"] == 1.0).all()
-
-
-@EVERY_WAY
-def test_values_of_all_kinds_are_set_connected_and_recorded(tmp_path, way):
-    system = system_of(
-        build(tmp_path),
-        "ab",
-        {f"b.{target}": f"a.{source}" for target, source in _PASSED.items()},
-    )
-    values = {"u": 0.1, "mode": "storm", "on": True, "said": "Grüße, 1", "count": 7}
-    table = run(with_values(system, values), **way)
-    assert table["a.mode_y"][0] == 4.0
-    assert table["a.heard"].tolist() == ["Grüße, 1"] * 11
-    for name, value in (("y", 0.1), ("mode_y", 4.0), ("fault", 1.0), ("heard", "Grüße, 1")):
-        assert table[f"b.{name}"].tolist() == [value] * 11
-    assert table.parameters[PortName("a", "count")] == 7
-    assert table.ending.messages == ()
 
 
 @pytest.mark.parametrize("form", ["csv", "parquet"])

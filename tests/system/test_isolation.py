@@ -91,14 +91,6 @@ def test_rows_equal_a_run_in_one_process(dist: Path):
     assert here.rows.tobytes() == there.rows.tobytes()
 
 
-def test_a_foreign_fmu_that_behaves_runs_to_the_end(c_fmu: Path):
-    """y = t + u, and the second takes the first one's output of the step before."""
-    table = run_isolated(foreign_system(c_fmu))
-    assert rows_until(table, 0.5)
-    assert np.allclose(table["bad.y"], table.time)
-    assert np.allclose(table["good.y"][1:], table.time[1:] + table.time[:-1])
-
-
 @pytest.mark.parametrize(
     ("act", "words"),
     [
@@ -129,16 +121,6 @@ def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, wo
     assert left_over(mark) == []
 
 
-@pytest.mark.parametrize(
-    ("way", "words"), [("crashes", "SIGABRT"), *slow(("hangs", "instantiate .* 1 s"))]
-)
-def test_an_isolated_fmu_that_fails_while_it_is_instantiated(c_fmu, mark, monkeypatch, way, words):
-    monkeypatch.setenv("FOREIGN_INSTANTIATE", way)
-    with pytest.raises(StartError, match=words):
-        run_isolated(foreign_system(c_fmu), timeout=1.0)
-    assert left_over(mark) == []
-
-
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_an_fmu_that_cannot_be_instantiated_is_bad_input(c_fmu, monkeypatch, isolation):
     monkeypatch.setenv("FOREIGN_INSTANTIATE", "refuses")
@@ -148,13 +130,22 @@ def test_an_fmu_that_cannot_be_instantiated_is_bad_input(c_fmu, monkeypatch, iso
 
 
 @pytest.mark.parametrize(
-    ("phase", "act", "words"),
+    ("instantiate", "act", "phase", "words"),
     [
-        ("ENTER", "CRASHES", "SIGSEGV .* in enter_initialization"),
-        *slow(("EXIT", "HANGS", "exit_initialization has not ended"), ("ENTER", "FATAL", "beyond")),
+        ("crashes", "BEHAVE", "STEP", "SIGABRT"),
+        ("", "CRASHES", "ENTER", "SIGSEGV .* in enter_initialization"),
+        *slow(
+            ("hangs", "BEHAVE", "STEP", "instantiate .* 1 s"),
+            ("", "HANGS", "EXIT", "exit_initialization has not ended"),
+            ("", "FATAL", "ENTER", "beyond"),
+        ),
     ],
 )
-def test_an_isolated_fmu_that_fails_before_its_first_step(c_fmu, mark, phase, act, words):
+def test_an_isolated_fmu_that_fails_before_its_first_step(
+    c_fmu, mark, monkeypatch, instantiate, act, phase, words
+):
+    if instantiate:
+        monkeypatch.setenv("FOREIGN_INSTANTIATE", instantiate)
     with pytest.raises(StartError, match=f"bad: .*{words}"):
         run_isolated(foreign_system(c_fmu, act, phase), timeout=1.0)
     assert left_over(mark) == []
@@ -226,10 +217,8 @@ def test_runs_in_threads_of_one_process_hear_their_own_fmus(c_fmu: Path, loop: s
     thread = threading.Thread(target=simulate_plan, args=(plan, [table], None, steps))
     thread.start()
     assert begun.wait(60.0)
-    assert (
-        len(simulate_plan(make_plan(talkative, Experiment(STEP, STEP)), stepping=steps).messages)
-        == 101
-    )
+    ending = simulate_plan(make_plan(talkative, Experiment(STEP, STEP)), stepping=steps)
+    assert len(ending.messages) == 101
     gc.collect()
     go_on.set()
     thread.join()
@@ -318,9 +307,8 @@ def test_rows_are_kept_whatever_an_fmu_does_to_the_process(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("loop", LOOPS)
-def test_an_alarm_ends_a_run_with_its_rows(archives, workplace, loop):
-    process = run(archives, "ALARMS", "--loop", loop, folder=workplace)
+def test_an_alarm_ends_a_run_with_its_rows(archives, workplace):
+    process = run(archives, "ALARMS", folder=workplace)
     *_, last = process.communicate()[1].splitlines()
     assert process.returncode == 1
     assert mentions(last, "auv-fmu: foreign interrupted SIGALRM --isolate")

@@ -244,6 +244,7 @@ def test_instances_do_not_know_of_each_other(workplace: Path):
     assert turns == [[row, row] for row in alone]
 
 
+@pytest.mark.slow
 def test_a_controller_of_ones_own_goes_with_it(workplace: Path):
     assert main(["new", "controller", "my_law"]) == 0
     scenario = str(Path("my_law", "my_law.toml"))

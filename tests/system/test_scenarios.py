@@ -13,9 +13,7 @@ from orchestrator.cosim import PortName, Table
 from orchestrator.paper.claims import (
     EFFORT_PD,
     EFFORT_PROPOSED,
-    TURNING_RADIUS,
     total_variation_until,
-    turning_radius,
 )
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.runs.wiring import closed_loop
@@ -85,29 +83,6 @@ def test_fig3b_settles_on_a_helix(run: Runner):
     (a, b, _), *_ = np.linalg.lstsq(A, x**2 + y**2)
     radius = np.hypot(x - a, y - b)
     assert np.ptp(radius) < 0.01 * radius.mean()
-
-
-def test_smallest_turning_radius_follows_from_the_printed_equations(dist: Path):
-    """(2) at rest under 80 N and 80 N.m, solved by Newton's method: not the quoted 0.6 m."""
-    m11, m22, d11, d22, d66 = 25.0, 17.5, 30.0, 30.0, 20.0
-    u, v, r = 1.0, -0.5, 3.0
-    for _ in range(50):
-        f = np.array(
-            [m22 * v * r - d11 * u + 80, -m11 * u * r - d22 * v,
-             (m11 - m22) * u * v - d66 * r + 80]
-        )  # fmt: skip
-        jacobian = np.array(
-            [[-d11, m22 * r, m22 * v], [-m11 * r, -d22, -m11 * u],
-             [(m11 - m22) * v, (m11 - m22) * u, -d66]]
-        )  # fmt: skip
-        u, v, r = np.array([u, v, r]) - np.linalg.solve(jacobian, f)
-    torques = {"u": 80.0, "q": 0.0, "r": 80.0}
-    system = system_of(dist, "fig3b").with_parameters(
-        {PortName("plant", f"tau.{k}"): value for k, value in torques.items()}
-    )
-    radius = turning_radius(simulated(system, 60.0, 0.02, loop="compiled"))
-    assert radius == pytest.approx(np.hypot(u, v) / r, rel=1e-6)
-    assert radius < 0.5 * TURNING_RADIUS
 
 
 @pytest.mark.parametrize("eps_t", [10.0, 1.0])
