@@ -247,7 +247,6 @@ def changed(file: str, old: str, new: str) -> dict[str, str]:
     [
         ({"fmi-ls-manifest.xml": None}, f"lag.fmu {FOLDER}/fmi-ls-manifest.xml"),
         ({"fmi-ls-manifest.xml": "<fmiReferences"}, "fmi-ls-manifest.xml well-formed"),
-        ({"fmi-ls-manifest.xml": "<Manifest/>"}, "<Manifest> <fmiReferences>"),
         ({"fmi-ls-manifest.xml": "<fmiReferences/>"}, "no results"),
         (
             {"fmi-ls-manifest.xml": '<!DOCTYPE a [<!ENTITY b "c">]><fmiReferences/>'},
@@ -255,20 +254,15 @@ def changed(file: str, old: str, new: str) -> dict[str, str]:
         ),
         (changed("fmi-ls-manifest.xml", "tests/smoke", "smoke"), "'smoke.exp'"),
         ({"tests/smoke.exp": "<Experiments/>"}, "tests/smoke.exp no experiment"),
-        ({"tests/smoke.exp": "time,y0\n"}, "smoke.exp"),
         ({"lag.ssv": None}, "step 'lag.ssv'"),
-        ({"tests/out.csv": None}, "step 'out.csv'"),
-        ({"tests/out.csv": "time,y0\n"}, "no rows"),
         ({"tests/out.csv": "time,z\n0,1\n"}, "none of the columns"),
         ({"tests/out.csv": "time,y0\n0,nan\n"}, "out.csv 2, y0: 'nan'"),
         ({"tests/out.csv": "time,y0\n7,0\n"}, "no row"),
         ({"tests/out.csv": "time,y0,lag.y0\n0,0,0\n"}, "two columns"),
-        ({"tests/out.csv": "y0\n0\n"}, "time"),
         ({"tests/in.csv": "time,u9\n0,0\n"}, "no inputs"),
         ({"tests/in.csv": "time,u0\n0,0\n1\n"}, "in.csv 3"),
         (changed("tests/smoke.exp", '"out.csv"', '"../../../modelDescription.csv"'), "modelDesc"),
         (changed("tests/smoke.exp", '"out.csv"', '"../../../../secret.csv"'), "secret.csv"),
-        (changed("tests/smoke.exp", '"out.csv"', '"/etc/passwd"'), "/etc/passwd"),
         (changed("tests/smoke.exp", '"out.csv"', '"https://a.example/b.csv"'), "is not in the FMU"),
         (
             changed("tests/smoke.exp", '"out.csv"', '"o.h5" type="application/hdf5"'),
@@ -276,10 +270,8 @@ def changed(file: str, old: str, new: str) -> dict[str, str]:
         ),
         (changed("tests/smoke.exp", "<Parameters", "<SteadyState/><Parameters"), "SteadyState"),
         (changed("tests/smoke.exp", '"1.0"', '"one"'), "stopTime 'one'"),
-        (changed("tests/smoke.exp", '"1.0"', '"-1.0"'), "-1"),
         (changed("tests/smoke.exp", 'stepSize="0.1"', 'tolerance="1"'), "tolerance 1"),
         (changed("lag.ssv", '"-2.0"', '"two"'), "A00 two"),
-        ({"lag.ssv": "<ParameterSet"}, "lag.ssv well-formed"),
     ],
 )
 def test_an_fmu_that_cannot_be_verified_is_refused(tmp_path: Path, files, reason: str, capsys):

@@ -22,7 +22,7 @@ WAYPOINTS = "x,y,z\n0,0,-2\n3,0,-2\n3,3,-2\n"
 
 
 def pair_of(text, **request):
-    """The two runs, from the text of a scenario."""
+    """Prepare both runs of a scenario, from its text."""
     Path("mine.toml").write_text(text)
     request = Request(kind="native", **request)
     return with_companion(prepare(*load_scenario("mine.toml", "native"), request), request)

@@ -51,10 +51,6 @@ def energy(parameters, state):
     return kinetic + parameters.vehicle.righting_pitch * (1.0 - upright)
 
 
-def started(parameters, eta0, nu0, water=NONE_3):
-    return plant.begin(parameters._replace(eta0=eta0, nu0=nu0), water)
-
-
 def drifted(parameters, state, water, dwater, h):
     """A step without actuators and disturbances."""
     rotation = rotation_from_quaternion(state.quaternion)
@@ -63,7 +59,7 @@ def drifted(parameters, state, water, dwater, h):
 
 @given(parameters=parameter_sets(), position=vectors(speeds, 3), psi=angles)
 def test_vehicle_at_rest_and_level_in_still_water_stays_so(parameters, position, psi):
-    state = later = started(parameters, (*position, 0.0, 0.0, psi), NONE_6)
+    state = later = plant.begin(parameters._replace(eta0=(*position, 0.0, 0.0, psi)), NONE_3)
     for _ in range(10):
         later = drifted(parameters, later, NONE_3, NONE_3, 0.02)
     assert later.position == state.position
@@ -101,7 +97,8 @@ def test_energy_never_grows_by_itself_in_any_steady_or_speeding_water(
     """Runs of the plant, in the frame of the water; the scheme of fourth order may add 1e-6."""
     if not parameters.roll.rolls:
         euler, nu = (0.0, 0.3 * euler[1], euler[2]), (*nu[:3], 0.0, *(0.3 * x for x in nu[4:]))
-    state = started(parameters, (0.0, 0.0, 0.0, *euler), nu, water)
+    eta0 = (0.0, 0.0, 0.0, *euler)
+    state = plant.begin(parameters._replace(eta0=eta0, nu0=nu), water)
     before = first = energy(parameters, state)
     for k in range(40):
         now = tuple(np.add(water, np.multiply(0.0025 * k, dwater)).tolist())

@@ -6,7 +6,6 @@ import json
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -50,23 +49,6 @@ def files(folder: Path) -> dict[str, int]:
     return {name: (folder / name).stat().st_mtime_ns for name in contents(folder)}
 
 
-def straight(path: Path) -> list[Any]:
-    """The outcomes of all runs, made one after the other in this process."""
-    study = read_study(str(path))
-    space = Space(study, {name: load_scenario(name, "native") for name in study.scenario})
-    engine = FmuEngine(space.prepared)
-    return list(engine.outcomes([space[i] for i in range(len(space))]))
-
-
-def check(result: Any, outcomes: list[Any]) -> None:
-    """That a table has these outcomes, one a run, in their order."""
-    assert list(result["run"]) == list(range(len(outcomes)))
-    assert list(result["failure"]) == [outcome.failure for outcome in outcomes]
-    for name in index_columns():
-        expected = [outcome.indices.get(name, np.nan) for outcome in outcomes]
-        assert np.array_equal(result[name], expected, equal_nan=True), name
-
-
 @pytest.mark.parametrize(
     ("scenario", "kind", "n", "option"),
     [
@@ -100,7 +82,14 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
     assert {"runs.parquet", "study.json"} < before.keys()
     assert not [name for name in before if name.startswith(".") or "sqlite" in name]
     result = sweep("mine.toml", kind="native")
-    check(result, straight(study))
+    runs = read_study("mine.toml")
+    space = Space(runs, {name: load_scenario(name, "native") for name in runs.scenario})
+    outcomes = [*FmuEngine(space.prepared).outcomes([space[i] for i in range(len(space))])]
+    assert list(result["run"]) == list(range(len(outcomes)))
+    assert list(result["failure"]) == [outcome.failure for outcome in outcomes]
+    for name in index_columns():
+        expected = [outcome.indices.get(name, np.nan) for outcome in outcomes]
+        assert np.array_equal(result[name], expected, equal_nan=True), name
     assert list(result["scenario"]) == ["fig5", "fig5-pd"] * 4
     assert list(result["plant.eta0.y"]) == [0.0] * 4 + [4.0] * 4
     assert list(result["controller.saturation"]) == ["tanh"] * 2 + ["algebraic"] * 2 + [
