@@ -67,21 +67,16 @@ def test_every_type_passes_through_three_fmus_exactly(fmu, way):
     assert table.rows.tobytes() == run(system).rows.tobytes()
 
 
-def slave_of(fmu: Path, folder: Path) -> FMU3Slave:
-    slave = FMU3Slave(
-        guid="typed", unzipDirectory=fmpy.extract(str(fmu), folder), modelIdentifier="typed",
-        instanceName="a",
-    )  # fmt: skip
-    slave.instantiate()
-    return slave
-
-
 @EVERY_WAY
 def test_arrays_are_the_ones_that_fmpy_gets(fmu, tmp_path, way):
     values = {"a.M[1,3]": 0.25, "a.M[2,1]": -7.5, "a.v[2]": 1e-3, "a.gain[2]": 3.0}
     values |= {"a.u_Float64": 2.0, "a.names[2]": "x y", "a.u_String": "!"}
     table = run(typed.system_of(fmu, parameters=values), **way)
-    slave = slave_of(fmu, tmp_path / "unpacked")
+    slave = FMU3Slave(
+        guid="typed", unzipDirectory=fmpy.extract(str(fmu), tmp_path), modelIdentifier="typed",
+        instanceName="a",
+    )  # fmt: skip
+    slave.instantiate()
     slave.setFloat64([typed.M], [1.0, 2.0, 0.25, -7.5, 5.0, 6.0])
     slave.setFloat64([typed.GAIN], [1.0, 3.0])
     slave.setString([typed.NAMES], ["a", "x y"])
@@ -106,8 +101,7 @@ def test_arrays_are_the_ones_that_fmpy_gets(fmu, tmp_path, way):
     assert [held[f"a.M[{i},{j}]"] for i in (1, 2) for j in (1, 2, 3)] == [1, 2, 0.25, -7.5, 5, 6]
 
 
-@EVERY_WAY
-def test_an_fmu_that_lacks_what_no_run_calls_runs(tmp_path, way):
+def test_an_fmu_that_lacks_what_no_run_calls_runs(tmp_path):
     table = run(typed.system_of(typed.build(tmp_path, "-DLACKS"), parameters={"a.complains": True}))
     assert len(table) == STEPS + 1
     # Percent signs are the message's own: in FMI 3.0 it is complete.
@@ -170,12 +164,6 @@ def test_our_loop_has_the_same_rows_in_both_versions(native, dist3, tmp_path, wa
     assert theirs.rows.tobytes() == ours.rows.tobytes()
 
 
-def feeding(tmp_path: Path, fmu: Path, source: str, target: str) -> System:
-    """Two FMUs of both versions, the later one first, and one wire between them."""
-    fmus = {"new": fmu, "old": others.build(tmp_path)}
-    return connected("both", fmus, {target: source})
-
-
 #: Wires between the versions; each input is fed once.
 FEEDING = {
     "new.u_Float64": "old.y",
@@ -221,7 +209,8 @@ def test_versions_feed_each_other(fmu, tmp_path, way, fed):
     ],
 )
 def test_what_would_lose_a_value_is_refused_with_both_types(fmu, tmp_path, source, target):
-    system = feeding(tmp_path, fmu, source, target)
+    fmus = {"new": fmu, "old": others.build(tmp_path)}
+    system = connected("both", fmus, {target: source})
     types = [
         system.component(n).variable(p).type for n, p in (source.split("."), target.split("."))
     ]
