@@ -74,11 +74,11 @@ def test_every_mistake_in_a_description_is_reported(dist: Path, tmp_path: Path):
     fmu = zipped(tmp_path / "wrong.fmu", {**content, DESCRIPTION: text.encode()})
     with pytest.raises(InputError) as error:
         read_component("plant", fmu)
-    said = str(error.value)
-    assert said.count("'outptu'") >= 5
-    assert re.search(r"and \d+ more lines", said)
-    assert "\n" not in said
-    assert len(said) < 4000
+    message = str(error.value)
+    assert message.count("'outptu'") >= 5
+    assert re.search(r"and \d+ more lines", message)
+    assert "\n" not in message
+    assert len(message) < 4000
 
 
 @pytest.mark.parametrize(

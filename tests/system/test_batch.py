@@ -270,17 +270,17 @@ def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "words"),
     [
         ('[[events]]\nat = 0.5\nfreeze = "plant.y"\n', "own events 'batch'"),
         ('coupling = "linear"\n', "coupling linear"),
     ],
 )
-def test_what_no_program_can_be_is_refused_by_name(workplace, refused, content, said):
+def test_what_no_program_can_be_is_refused_by_name(workplace, refused, content, words):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     Path("own.toml").write_text(f"stop_time = 1.0\n{content}")
     Path("mine.toml").write_text('scenario = "own.toml"\nengine = "batch"\n')
-    assert mentions(refused("sweep", "mine.toml", "--kind", KIND), said)
+    assert mentions(refused("sweep", "mine.toml", "--kind", KIND), words)
 
 
 def test_an_fmu_of_another_tool_is_refused_by_name(tmp_path):

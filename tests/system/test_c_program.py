@@ -163,8 +163,8 @@ def test_two_programs_are_linked_into_one(programs: Path, tmp_path: Path):
     folders = [programs / "fig4", programs / "path-single"]
     compile_c(GCC, *STRICT, *EXACT, *(f"-I{one}" for one in folders), tmp_path / "both.c",
               *(sources(one)[0] for one in folders), "-o", tmp_path / "both", "-lm")  # fmt: skip
-    said = subprocess.run([tmp_path / "both"], check=True, capture_output=True, text=True).stdout
-    times_and_places = [float(word) for word in said.split()]
+    output = subprocess.run([tmp_path / "both"], check=True, capture_output=True, text=True).stdout
+    times_and_places = [float(word) for word in output.split()]
     quiet = simulate("fig4", {"plant.noise.std": 0.0}, stop_time=2.0, kind="native")
     noisy, path = expected("fig4", 1000), expected("path", 400)
     assert times_and_places[:4] == [2.0, quiet["plant.eta.x"][-1], 2.02, noisy["plant.eta.x"][101]]
@@ -174,8 +174,8 @@ def test_two_programs_are_linked_into_one(programs: Path, tmp_path: Path):
 def symbols(path: Path, folder: Path) -> dict[str, str]:
     """The kinds of all symbols of a source's object file."""
     compile_c(GCC, "-std=c99", "-c", path, "-o", folder / "one.o")
-    said = subprocess.run(["nm", folder / "one.o"], check=True, capture_output=True, text=True)
-    return {words[-1]: words[-2] for words in map(str.split, said.stdout.splitlines())}
+    output = subprocess.run(["nm", folder / "one.o"], check=True, capture_output=True, text=True)
+    return {words[-1]: words[-2] for words in map(str.split, output.stdout.splitlines())}
 
 
 @needs_gcc

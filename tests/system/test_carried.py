@@ -308,11 +308,11 @@ def test_all_outputs_without_a_result_are_named_if_asked(tmp_path: Path, capsys)
     }
     fmu = carrying(typed.build(tmp_path), files)
     assert main(["verify", fmu]) == 0
-    said = capsys.readouterr().out
-    assert mentions(said, "21, w[1] --verbose") and "y_String" not in said
+    output = capsys.readouterr().out
+    assert mentions(output, "21, w[1] --verbose") and "y_String" not in output
     assert main(["verify", fmu, "--verbose"]) == 0
-    said = capsys.readouterr().out
-    assert mentions(said, "y_Float32 y_String") and "--verbose" not in said
+    output = capsys.readouterr().out
+    assert mentions(output, "y_Float32 y_String") and "--verbose" not in output
 
 
 @pytest.mark.parametrize("option", ["--scenario=fig5", "--step=0.1"])

@@ -86,8 +86,8 @@ def test_all_mistakes_of_a_study_are_said(tmp_path, capsys):
     file = tmp_path / "mine.toml"
     file.write_text('titel = "x"\n[sample]\nn = 0\n[sample.range]\nplant.ell = [0.3, 0.4]\n')
     assert main(["check", str(file)]) == 2
-    said = [line.partition("mine.toml: ")[2] for line in capsys.readouterr().out.splitlines()]
-    assert {text.partition(";")[0] for text in said} == {
+    output = [line.partition("mine.toml: ")[2] for line in capsys.readouterr().out.splitlines()]
+    assert {text.partition(";")[0] for text in output} == {
         "sample: n = 0: write a whole number from 1 to 1,000,000,000",
         "unknown entry 'titel'",
         "lacks scenario",
@@ -125,13 +125,13 @@ def test_check_of_a_study_finds_what_sweep_finds(content, culprits, workplace, c
     file = workplace / "mine.toml"
     file.write_text(toml_text({"scenario": "fig5", **content}))
     assert main(["check", "mine.toml"]) == 2
-    said = [line.removeprefix("problem: ") for line in capsys.readouterr().out.splitlines()]
-    assert len(said) == len(culprits)
+    output = [line.removeprefix("problem: ") for line in capsys.readouterr().out.splitlines()]
+    assert len(output) == len(culprits)
     for words in culprits:
-        assert any(mentions(line, words) for line in said), said
+        assert any(mentions(line, words) for line in output), output
     assert main(["sweep", "mine.toml"]) == 2
     first = capsys.readouterr().err.removeprefix("auv-fmu: ").partition(" (and ")[0].strip()
-    assert first == said[0]
+    assert first == output[0]
     assert {path.name for path in workplace.iterdir()} == {"mine.toml"}
 
 
@@ -170,23 +170,23 @@ def test_all_mistakes_of_an_archive_are_said(dist, workplace, capsys):
 
 
 _FORGOTTEN = '[components]\ncontroller = "PdController"\n'
-_SAID = 'nothing feeds or sets controller.dy.*; wire "controller.dy" = "plant.dy"'
+_MESSAGE = 'nothing feeds or sets controller.dy.*; wire "controller.dy" = "plant.dy"'
 
 
 def test_a_forgotten_wire_is_named(workplace, capsys):
     Path("pd.toml").write_text(_FORGOTTEN)
     assert main(["check", "pd.toml"]) == 0
-    assert lines(capsys) == [f"info: {_SAID}", "pd.toml: no problems found"]
+    assert lines(capsys) == [f"info: {_MESSAGE}", "pd.toml: no problems found"]
     run = ["run", "pd.toml", "--stop-time", "0.1", "--no-figures"]
     assert main(run) == 0
-    assert f"warning: pd: {_SAID}" in capsys.readouterr().err
+    assert f"warning: pd: {_MESSAGE}" in capsys.readouterr().err
     assert main([*run, "--strict"]) == 2
-    assert _SAID in capsys.readouterr().err
+    assert _MESSAGE in capsys.readouterr().err
     for call in (load, lambda name: simulate(name, stop_time=0.1)):
-        with pytest.warns(UserWarning, match="wire") as told:
+        with pytest.warns(UserWarning, match="wire") as caught:
             call("pd.toml")
-        assert [str(warning.message) for warning in told] == [_SAID]
-        assert told[0].filename == __file__
+        assert [str(warning.message) for warning in caught] == [_MESSAGE]
+        assert caught[0].filename == __file__
     with pytest.raises(InputError, match=r"controller\.dy"):
         load("pd.toml", strict=True)
 
@@ -260,14 +260,16 @@ VEHICLES = {
 
 @pytest.mark.parametrize("values", VEHICLES)
 def test_another_vehicle_in_some_components_is_named(workplace, capsys, values):
-    said = VEHICLES[values]
+    info = VEHICLES[values]
     Path("auv.toml").write_text(f"stop_time = 0.1\n[parameters]\n{values}\n")
     assert main(["check", "auv.toml"]) == 0
-    wrong = [] if said is None else [f"info: {said}"]
+    wrong = [f"info: {info}"] if info else []
     assert lines(capsys) == [*wrong, "auv.toml: no problems found"]
     assert main(["run", "auv.toml", "--no-figures"]) == 0
-    assert capsys.readouterr().err == ("" if said is None else f"auv-fmu: warning: auv: {said}\n")
-    assert main(["run", "auv.toml", "--no-figures", "--strict"]) == (0 if said is None else 2)
+    assert capsys.readouterr().err == (
+        "" if output is None else f"auv-fmu: warning: auv: {output}\n"
+    )
+    assert main(["run", "auv.toml", "--no-figures", "--strict"]) == (2 if info else 0)
 
 
 @pytest.mark.parametrize("name", names())

@@ -229,10 +229,10 @@ def test_a_signal_leaves_the_rows_and_the_checkpoint(loop, capsys):
     process = start("run", *arguments, "--real-time", "1", "--out", "stopped")
     assert eventually(lambda: states("stopped").get("row"))
     process.send_signal(signal.SIGINT)
-    said = process.communicate()[1].splitlines()
+    lines = process.communicate()[1].splitlines()
     assert process.returncode == 1
-    assert said[-2].endswith(", from stopped/checkpoint")
-    assert "interrupted at t = " in said[-1]
+    assert lines[-2].endswith(", from stopped/checkpoint")
+    assert "interrupted at t = " in lines[-1]
     assert run(*arguments, "--resume", out="stopped") == 0
     assert result("stopped") == result("whole")
 

@@ -53,7 +53,7 @@ def row(now: Instant, acting: Instant, T: tuple[float, ...]) -> dict[str, float]
         for name in names:
             group(name, members, numbers)
 
-    signals, state, told = acting.signals, acting.controller_state, acting.measured
+    signals, state, measured = acting.signals, acting.controller_state, acting.measured
     vehicle, seen = now.vehicles.plant, now.scene.plant
     planned, reference = now.vehicles.planner, now.scene.reference
     both(("plant.tau", "controller.tau"), UQR, signals.tau)
@@ -68,11 +68,11 @@ def row(now: Instant, acting: Instant, T: tuple[float, ...]) -> dict[str, float]
     group("plant.dy", XYZ, seen.dy)
     given = zip(T, vehicle.tau, acting.tau, strict=True)
     group("plant.tau_applied", UQR, [state if lag else tau for lag, state, tau in given])
-    group("controller.y", XYZ, told.y)
-    group("controller.eta", ("phi", "theta", "psi"), told.euler)
-    group("controller.y_d", XYZ, told.y_d)
-    group("controller.dy_d", XYZ, told.dy_d)
-    group("controller.ddy_d", XYZ, told.ddy_d)
+    group("controller.y", XYZ, measured.y)
+    group("controller.eta", ("phi", "theta", "psi"), measured.euler)
+    group("controller.y_d", XYZ, measured.y_d)
+    group("controller.dy_d", XYZ, measured.dy_d)
+    group("controller.ddy_d", XYZ, measured.ddy_d)
     group("controller.y_hat", XYZ, state.y_hat)
     group("controller.dy_hat", XYZ, signals.dy_hat)
     for i, estimate in enumerate(state.theta_hat, start=1):

@@ -107,8 +107,8 @@ def test_wires_are_removed_in_either_table(workplace):
 def test_references_that_differ_are_said(workplace, capsys):
     Path("mine.toml").write_text("stop_time = 1.0\n" + PD + "parameters.planner.tau_d.u = 3.0\n")
     assert main(["run", "mine.toml", "--no-figures", "--kind", "native"]) == 0
-    said = capsys.readouterr().err
-    assert mentions(said, "pd: reference planner.y_d mine")
+    message = capsys.readouterr().err
+    assert mentions(message, "pd: reference planner.y_d mine")
 
 
 COMPARED = [name for name in names() if read_scenario(name).compare]

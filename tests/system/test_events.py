@@ -91,19 +91,20 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
         signals = output_feedback.evaluate(gains, control, measured, H)
         # In Jacobi order what an event changes at an instant shows in outputs of the next.
         now = signals.tau, seen.plant.nu_r, setting.disturbance
-        told, nu_r, waves = before if before and delayed else now
+        commanded, nu_r, waves = before if before and delayed else now
         tau_w = disturbance(waves, nu_r, k * H)
         before = now
         if k == 95:
             # After a reset it shows its new outputs, as at the start.
-            told = signals.tau
+            commanded = signals.tau
         if k in Span(10, 25):
-            told = (5.0, *told[1:])
+            commanded = (5.0, *commanded[1:])
         if lost and k in lost:
-            told = (told[0], 0.0, 0.0)
-        yield {"k": k, "vehicle": vehicles.plant, "seen": seen, "tau": signals.tau, "told": told}
+            commanded = (commanded[0], 0.0, 0.0)
+        row = {"tau": signals.tau, "commanded": commanded}
+        yield {"k": k, "vehicle": vehicles.plant, "seen": seen, **row}
         control = output_feedback.step(control, signals, H)
-        tau = plant.applied(setting.plant, told)
+        tau = plant.applied(setting.plant, commanded)
         vehicles = line.move(setting, vehicles, tau, tau_w, parts)
     assert lost is not None
 
@@ -125,7 +126,7 @@ def test_events_equal_the_straight_line_bit_for_bit(way, order):
     for group, rows in after.items():
         names = [name for name in table.columns if name.startswith(f"{group}.")]
         np.testing.assert_array_equal(table.group(*names), rows, group)
-    for group, key in (("controller.tau", "tau"), ("plant.tau", "told")):
+    for group, key in (("controller.tau", "tau"), ("plant.tau", "commanded")):
         values = table.step_values(*(f"{group}.{k}" for k in "uqr"))
         np.testing.assert_array_equal(values, [i[key] for i in instants[:-1]], group)
     times = [event.time for event in table.events]
@@ -244,15 +245,15 @@ def test_what_happens_is_said_recorded_and_kept(workplace: Path, capsys):
         '[[events]]\nwhen = "plant.eta.z > 100"\nstop = true\n' + PD
     )
     assert main(["run", "mine.toml", "--kind", "native", "--out", "out"]) == 0
-    said = capsys.readouterr().err.splitlines()
-    assert any(mentions(line, "warning: mine: plant.eta.z > 100") for line in said)
-    assert "auv-fmu: mine: t = 0.3 s: lose controller.tau.r (no yaw)" in said
-    assert "auv-fmu: mine: t = 0.5 s: lose controller.tau.r, ended" in said
+    lines = capsys.readouterr().err.splitlines()
+    assert any(mentions(line, "warning: mine: plant.eta.z > 100") for line in lines)
+    assert "auv-fmu: mine: t = 0.3 s: lose controller.tau.r (no yaw)" in lines
+    assert "auv-fmu: mine: t = 0.5 s: lose controller.tau.r, ended" in lines
     # The PD controller has no k_d.
-    assert [line for line in said if "t = 0.4 s" in line] == [
+    assert [line for line in lines if "t = 0.4 s" in line] == [
         "auv-fmu: mine: t = 0.4 s: set controller.k_d = 60"
     ]
-    assert "auv-fmu: pd: t = 0.3 s: lose controller.tau.r (no yaw)" in said
+    assert "auv-fmu: pd: t = 0.3 s: lose controller.tau.r (no yaw)" in lines
     events = json.loads(Path("out/run.json").read_text())["events"]
     assert [(e["time"], e["label"]) for e in events] == [
         (0.3, "no yaw"), (0.4, "set controller.k_d = 60"), (0.5, ""),
@@ -290,7 +291,7 @@ def test_what_a_system_has_not_is_said_where_it_goes_without(workplace: Path, ca
 
 #: By controller: largest error in the 20 s before the event, and after it; how long after the end
 #: of the event the error exceeds half a metre [s]; a bound on the commanded force [N].
-SAID = {
+EXPECTED = {
     "fault-thruster": {"proposed": (0.26, 0.88, 2.2, 40.0), "PD": (0.22, 0.87, 2.9, 40.0)},
     "fault-sensor": {"proposed": (0.26, 5.7, 6.6, 219.0), "PD": (0.22, 1.18, 1.8, 80.0)},
     "current-step": {"proposed": (0.26, 0.51, None, 40.0), "PD": (0.22, 0.43, None, 40.0)},
@@ -298,12 +299,12 @@ SAID = {
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("name", SAID)
+@pytest.mark.parametrize("name", EXPECTED)
 def test_what_is_said_of_the_scenarios_is_so_in_every_draw_of_the_noise(name, seed):
     [event] = read_scenario(name).events
     begin, end = event["at"], event["at"] + event.get("for", 0.0)
     tables = compared(name, parameters={"plant.noise.seed": seed})
-    for table, (before, largest, below, most) in zip(tables, SAID[name].values(), strict=True):
+    for table, (before, largest, below, most) in zip(tables, EXPECTED[name].values(), strict=True):
         error = np.linalg.norm(tracking_error(table), axis=1)
         time, after = table.time, table.time >= begin
         assert error[(time >= begin - 20.0) & ~after].max() == pytest.approx(before, abs=0.0055)

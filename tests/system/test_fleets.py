@@ -79,8 +79,8 @@ def test_events_happen_to_nested_components(ssp: Path, tmp_path: Path):
         '[[events]]\nat = 0.7\nlose = ["auv1.disturbance.tau_w", "auv2.disturbance.tau_w.u"]\n'
     )
     run(ssp, tmp_path / "r", "--events", str(events))
-    said = json.loads((tmp_path / "r" / "run.json").read_text())["events"]
-    assert len(said) == 6
+    events = json.loads((tmp_path / "r" / "run.json").read_text())["events"]
+    assert len(events) == 6
     result = read(tmp_path / "r")
     assert result["auv1.plant.tau.u"][-1] == 3.0 != result["auv2.plant.tau.u"][-1]
     assert result["auv2.plant.water.x"][-1] == 0.2 and result["auv1.plant.water.x"][-1] == 0.0

@@ -73,8 +73,8 @@ def test_an_input_that_nothing_feeds_keeps_what_the_fmu_begins_with(tmp_path, wa
 @pytest.mark.parametrize("form", ["csv", "parquet"])
 def test_files_keep_texts_and_numbers(workplace, form):
     """Also where a text has commas, quotes and lines of its own."""
-    said = 'one, "two"\nthree'
-    [archive] = write_ssp(with_values(system_of(build(workplace)), {"said": said}), workplace)
+    text = 'one, "two"\nthree'
+    [archive] = write_ssp(with_values(system_of(build(workplace)), {"said": text}), workplace)
     if form == "parquet":
         pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     command = f"run {archive} --stop-time 0.3 --step 0.1 --no-figures --out r --format {form}"
@@ -82,11 +82,11 @@ def test_files_keep_texts_and_numbers(workplace, form):
     if form == "csv":
         with Path("r", "result.csv").open(newline="", encoding="utf-8") as file:
             names, *rows = csv.reader(file)
-        assert [row[names.index("a.heard")] for row in rows] == [said] * 4
+        assert [row[names.index("a.heard")] for row in rows] == [text] * 4
     _, table, *_ = read_result(Path("r"))
     assert (table["a.y"] == 101325.0).all()
     assert "a.heard" not in table
-    assert read(Path("r"))["a.heard"].tolist() == [said] * 4
+    assert read(Path("r"))["a.heard"].tolist() == [text] * 4
 
 
 @EVERY_WAY
@@ -330,9 +330,14 @@ def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variabil
     file.write_text("time,a.u\n" + "".join(f"{t},{u}\n" for t, u in rows))
     system, input_table = read_inputs(Inputs(file), system_of(fmu), ())
     table = run(system, hooks=[Playback(input_table)], **way)
-    told = np.array(rows, dtype=[("time", float), ("u", float)])
+    inputs = np.array(rows, dtype=[("time", float), ("u", float)])
     theirs = fmpy.simulate_fmu(
-        str(fmu), stop_time=1.0, output_interval=0.1, input=told, output=["y"], validate=False
+        str(fmu),
+        stop_time=1.0,
+        output_interval=0.1,
+        input=inputs,
+        output=["y"],
+        validate=False,
     )
     # Its last step may be one of a rounding error.
     np.testing.assert_allclose(table["a.y"][1:], theirs["y"][1 : len(table)], atol=1e-12)

@@ -274,5 +274,5 @@ def test_ecos_command_line_runs_the_ssp_with_an_empty_environment(dist: Path, tm
         check=False, capture_output=True, text=True,
     )  # fmt: skip
     assert process.returncode == 0, process.stdout + process.stderr
-    said = verify(tmp_path / "auv.csv", closed_loop(dist), 1e-5)
-    assert "to 1 s, in jacobi order, outputs read after values are passed on" in said
+    report = verify(tmp_path / "auv.csv", closed_loop(dist), 1e-5)
+    assert "to 1 s, in jacobi order, outputs read after values are passed on" in report

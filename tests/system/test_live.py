@@ -145,14 +145,16 @@ def compiled(run: Prepared) -> Prepared:
 OF_SINES = ("final_error",)
 
 
-def compare_indices(run: Prepared, table: Table, found: np.ndarray, said: Any, near: Sequence[str]):
+def compare_indices(
+    run: Prepared, table: Table, found: np.ndarray, outcome: Any, near: Sequence[str]
+):
     """Compare the indices of rows in Node with those that the master has of the same rows.
 
     Args:
         run: that was made.
         table: of the master.
         found: the rows in Node.
-        said: of them.
+        outcome: of them.
         near: the indices that need not be the same bit for bit.
 
     """
@@ -161,7 +163,7 @@ def compare_indices(run: Prepared, table: Table, found: np.ndarray, said: Any, n
     metrics = metrics_of(Table.of(table.header, rows), run.loops)
     together = {name: [value] for name, value in metrics.together.items()}
     assert len(together) == (len(run.loops) > 1)
-    for loop, measured in zip(run.loops, said["metrics"], strict=True):
+    for loop, measured in zip(run.loops, outcome["metrics"], strict=True):
         wanted = metrics.found(loop) | together
         assert measured.keys() == wanted.keys()
         for index, values in wanted.items():
@@ -184,7 +186,7 @@ def test_only_the_c_library_makes_rows_differ(parts: Parts, tmp_path, monkeypatc
     (tmp_path / "same.wasm").write_bytes(content)
     rows_of(parts, "fig4", tmp_path)
     other_rows = (tmp_path / "fig4.0").read_bytes()
-    said = parts._replace(modules=[tmp_path / "same.wasm"]).node("rows.mjs", str(tmp_path))
+    outcome = parts._replace(modules=[tmp_path / "same.wasm"]).node("rows.mjs", str(tmp_path))
     fmus = with_same_functions(bundle.current_fmus(NATIVE), tmp_path)
     options = (*compiled_reducers._OPTIONS, "-include", str(SAME_FUNCTIONS))
     monkeypatch.setattr(compiled_reducers, "_OPTIONS", options)
@@ -198,8 +200,8 @@ def test_only_the_c_library_makes_rows_differ(parts: Parts, tmp_path, monkeypatc
             wanted = table.rows[:, places(table)]
             found = np.fromfile(tmp_path / f"{name}.{i}").reshape(wanted.shape)
             assert found.tobytes() == wanted.tobytes(), (name, i)
-            assert said[f"{name}.{i}"].get("failure") == ending.failure
-            compare_indices(run, table, found, said[f"{name}.{i}"], ())
+            assert outcome[f"{name}.{i}"].get("failure") == ending.failure
+            compare_indices(run, table, found, outcome[f"{name}.{i}"], ())
     compiled_reducers.library_of.cache_clear()
     # They are not the rows of any C library.
     assert (tmp_path / "fig4.0").read_bytes() != other_rows
@@ -227,22 +229,22 @@ def with_same_functions(folder: Path, place: Path) -> Path:
     [("chattering", 20.0), ("refused", 18.0)],
 )
 def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Parts, tmp_path):
-    said, run = both(ALL.replace("LAST", ENDS[last]), parts, tmp_path)
-    ending, table = compare(run, said, tmp_path)
+    outcome, run = both(ALL.replace("LAST", ENDS[last]), parts, tmp_path)
+    ending, table = compare(run, outcome, tmp_path)
     assert table.time[-1] == pytest.approx(end)
-    assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
+    assert [tuple(one.values()) for one in outcome["happened"]] == [*ending.events]
     assert len(ending.events) > 12
     if ending.failure is None:
-        assert "failure" not in said
+        assert "failure" not in outcome
     else:
-        assert said["failure"] == "stopped at t = 18 s: plant refused its step"
+        assert outcome["failure"] == "stopped at t = 18 s: plant refused its step"
         assert ending.failure.startswith("stopped at t = 18 s: plant: ")
 
 
 def test_vehicles_have_any_names_and_may_have_no_controller(parts: Parts, tmp_path):
-    said, run = both('stop_time = 5.0\n[components]\ntow = "AuvPlant"\n', parts, tmp_path)
-    compare(run, said, tmp_path)
-    one, other = said["metrics"]
+    outcome, run = both('stop_time = 5.0\n[components]\ntow = "AuvPlant"\n', parts, tmp_path)
+    compare(run, outcome, tmp_path)
+    one, other = outcome["metrics"]
     assert one.keys() - other.keys() == {"final_error"}
     assert other["peak_command"] == [0.0, 0.0, 0.0]
 
@@ -251,27 +253,27 @@ def both(text: str, parts: Parts, folder: Path) -> tuple[Any, Prepared]:
     """Run a scenario in Node, and prepare it for the master."""
     scenario = folder / "mine.toml"
     scenario.write_text(text)
-    said = made(parts.engine, str(scenario), folder, alone=True).node("rows.mjs", str(folder))
-    return said["mine.0"], runs_of(str(scenario))[0]
+    outcome = made(parts.engine, str(scenario), folder, alone=True).node("rows.mjs", str(folder))
+    return outcome["mine.0"], runs_of(str(scenario))[0]
 
 
-def compare(run: Prepared, said: Any, folder: Path) -> tuple[Ending, Table]:
+def compare(run: Prepared, outcome: Any, folder: Path) -> tuple[Ending, Table]:
     """Compare rows and indices of a scenario's run in Node with the run itself."""
     table = Table()
     ending = run.run([table])
     wanted = table.rows[:, places(table)]
     found = np.fromfile(folder / "mine.0").reshape(wanted.shape)
     assert found == pytest.approx(wanted, rel=TOLERANCE, abs=TOLERANCE)
-    compare_indices(run, table, found, said, OF_SINES)
+    compare_indices(run, table, found, outcome, OF_SINES)
     return ending, table
 
 
 def test_a_state_that_a_guard_starts_over_is_told(parts: Parts, tmp_path):
     """An observer restarts."""
     gate = "stop_time = 2.0\n[parameters]\ncontroller.innovation_gate = 1e-6\n"
-    said, run = both(gate, parts, tmp_path)
+    outcome, run = both(gate, parts, tmp_path)
     [message] = run.run([]).messages
-    assert said["messages"] == [message]
+    assert outcome["messages"] == [message]
 
 
 #: Scenarios that need a program of their own.
@@ -287,17 +289,17 @@ OTHERS = {
 def test_systems_of_a_users_own_run_in_the_page(text, parts: Parts, tmp_path):
     if "MyLaw" in text:
         new_controller("my_law", tmp_path / "law")
-    said, run = both(text, parts, tmp_path)
-    ending, _ = compare(run, said, tmp_path)
-    assert said.get("failure") == ending.failure is None
+    outcome, run = both(text, parts, tmp_path)
+    ending, _ = compare(run, outcome, tmp_path)
+    assert outcome.get("failure") == ending.failure is None
 
 
 def test_a_component_outside_the_language_is_refused_in_one_line(tmp_path, capsys):
     new_controller("other_law", tmp_path / "law", python=True)
     assert main(["live", str(tmp_path / "law" / "other_law.toml")]) == 2
     error = capsys.readouterr().err
-    told = "other_law: the live page cannot run controller: OtherLaw.fmu is not a component"
-    assert told in error
+    refusal = "other_law: the live page cannot run controller: OtherLaw.fmu is not a component"
+    assert refusal in error
     assert error.count("\n") == 1
     new_controller("bad_law", tmp_path / "bad")
     script = tmp_path / "bad" / "bad_law.py"

@@ -80,8 +80,8 @@ def worker(process):
 def test_killed_twice_interrupted_once_and_short_of_a_worker(workplace):
     (workplace / "study.toml").write_text(STUDY)
     peace = sweep("peace")
-    _, said = peace.communicate(timeout=300)
-    assert peace.returncode == 0, said
+    _, errors = peace.communicate(timeout=300)
+    assert peace.returncode == 0, errors
 
     out = workplace / "trouble"
     for end in (signal.SIGKILL, signal.SIGINT, signal.SIGKILL):
@@ -89,14 +89,14 @@ def test_killed_twice_interrupted_once_and_short_of_a_worker(workplace):
         kept = in_the_middle(process, out)
         # Ctrl-C reaches every process of a terminal.
         (os.killpg if end == signal.SIGINT else os.kill)(process.pid, end)
-        _, said = process.communicate(timeout=60)
-        assert process.returncode == (130 if end == signal.SIGINT else -end), said
+        _, errors = process.communicate(timeout=60)
+        assert process.returncode == (130 if end == signal.SIGINT else -end), errors
         assert kept <= rows(out) < RUNS
     process = sweep("trouble")
     in_the_middle(process, out)
     worker(process).kill()
-    _, said = process.communicate(timeout=300)
-    assert (process.returncode, said) == (0, "")
+    _, errors = process.communicate(timeout=300)
+    assert (process.returncode, errors) == (0, "")
     table = parquet.read_table(out / "runs.parquet")
     assert table["run"].to_pylist() == list(range(RUNS))
     assert table.equals(parquet.read_table(workplace / "peace" / "runs.parquet"))

@@ -93,15 +93,15 @@ def test_full_disk_at_any_stage(workplace, capsys, size):
     with small_disk(workplace / "disk", size) as disk:
         folder = disk / "r"
         status = main(["run", "fig4", "--stop-time", "2", "--out", str(folder)])
-        said = capsys.readouterr().err.splitlines()
-        assert len(said) == 1
-        assert "No space left on device" in said[0]
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == 1
+        assert "No space left on device" in lines[0]
         if status == 2:
             # Not even what is taken before the first row.
             assert contents(disk) == {}
             return
         assert status == 1
-        assert failure(folder) in said[0]
+        assert failure(folder) in lines[0]
         whole = simulate("fig4", stop_time=2.0).rows
         kept = rows(folder)
         assert np.array_equal(kept, whole[: len(kept)])
@@ -131,9 +131,9 @@ def test_no_room_for_the_folder_of_a_companion(workplace, capsys, monkeypatch):
 def test_full_folder_is_named_and_left_empty(workplace, variable):
     """For temporary files, and the cache."""
     with small_disk(workplace / "disk", 300_000) as disk:
-        status, said = called(*RUN, "0.1", environment={variable: str(disk)})
+        status, lines = called(*RUN, "0.1", environment={variable: str(disk)})
         assert status == 2
-        assert mentions(said[-1], f"{disk} No space left")
+        assert mentions(lines[-1], f"{disk} No space left")
         assert not list(disk.glob("auv*/*/*"))
 
 
@@ -152,12 +152,12 @@ def test_limit_of_the_size_of_files_is_like_a_full_disk(workplace):
 def test_short_memory_is_said_and_loses_no_rows(workplace):
     """Python and numpy need 150 MB of address space, figures 300."""
     limit = {resource.RLIMIT_AS: 235 * 10**6}
-    status, said = called("run", "fig4", "--stop-time", "1", limits=limit)
+    status, lines = called("run", "fig4", "--stop-time", "1", limits=limit)
     assert status in (1, 2)
-    assert not [line for line in said if "Traceback" in line]
-    if status == 1 and said[-1].startswith("auv-fmu: fig4"):
+    assert not [line for line in lines if "Traceback" in line]
+    if status == 1 and lines[-1].startswith("auv-fmu: fig4"):
         assert len(rows(workplace / "results" / "fig4")) == 51
-        assert failure(workplace / "results" / "fig4") in said[-1]
+        assert failure(workplace / "results" / "fig4") in lines[-1]
 
 
 def test_folders_that_may_not_be_written(workplace):
@@ -178,8 +178,8 @@ def test_folders_that_may_not_be_written(workplace):
             assert "; choose " in line
         assert contents(sealed) == before
         # To look at it needs no more than to read it.
-        status, said = called("plot", "sealed/r", before=without_privileges)
-        assert (status, said) == (0, [])
+        status, lines = called("plot", "sealed/r", before=without_privileges)
+        assert (status, lines) == (0, [])
     finally:
         for path in (sealed, sealed / "r"):
             path.chmod(0o700)
@@ -194,8 +194,8 @@ def test_home_that_may_not_be_written(workplace):
 
 
 def test_no_home_and_no_temporary_folder(workplace):
-    status, said = called(*RUN, "0.1", environment={"HOME": None, "TMPDIR": "/nonexistent"})
-    assert (status, said) == (0, [])
+    status, lines = called(*RUN, "0.1", environment={"HOME": None, "TMPDIR": "/nonexistent"})
+    assert (status, lines) == (0, [])
 
 
 def under_way(folder: Path) -> bool:
@@ -371,6 +371,6 @@ def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys):
     begun = time.monotonic()
     assert main([*RUN, "20"]) == 0
     taken = time.monotonic() - begun
-    told = json.loads(Path("results/fig4/run.json").read_text())["seconds"]
-    assert 0.0 < told <= taken
+    recorded = json.loads(Path("results/fig4/run.json").read_text())["seconds"]
+    assert 0.0 < recorded <= taken
     assert len(rows(workplace / "results" / "fig4")) == 1001

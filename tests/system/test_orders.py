@@ -61,8 +61,8 @@ def test_a_ring_that_feeds_another_is_opened_first(folder):
     system = system_of(fmus, wires)
     arrangement = arrange(system, "gauss-seidel")
     assert arrangement.stages == [["c"], ["d"], ["a"], ["b"], ["e"]]
-    said = arrangement.delays()
-    assert [mentions(*pair) for pair in zip(said, ("a b.g", "c d.g"), strict=True)] == [True, True]
+    lines = arrangement.delays()
+    assert [mentions(*pair) for pair in zip(lines, ("a b.g", "c d.g"), strict=True)] == [True, True]
 
 
 def test_strict_wants_rings_solved_unless_something_else_is_stated(folder):

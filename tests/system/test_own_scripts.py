@@ -125,7 +125,7 @@ def test_data_of_a_component_are_in_its_fmu(workplace: Path):
     assert simulate("out/OwnLag.fmu", stop_time=0.1, step=0.1)["OwnLag.x"][0] == 3.0
 
 
-def said_by(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     """The line with which a command refuses something."""
     capsys.readouterr()
     assert main([*arguments]) == 2
@@ -138,8 +138,8 @@ def test_data_in_the_current_folder_are_refused_with_the_line(own: Path, capsys)
         SLAVE.replace('(HERE / "data" / "table.txt")', 'Path("data/table.txt")')
     )
     line = 1 + SLAVE[: SLAVE.index("TABLE =")].count("\n")
-    said = said_by(capsys, "build", "own.py")
-    assert mentions(said, f"own.py:{line}: data/table.txt Path(__file__) Own.fmu removed")
+    output = refusal(capsys, "build", "own.py")
+    assert mentions(output, f"own.py:{line}: data/table.txt Path(__file__) Own.fmu removed")
 
 
 def test_a_failed_build_leaves_no_fmu_of_the_script(own: Path, capsys):
@@ -148,13 +148,13 @@ def test_a_failed_build_leaves_no_fmu_of_the_script(own: Path, capsys):
         shutil.copy("Own.fmu", other)
     others[2].write_bytes(b"no FMU")
     Path("beside.py").write_text("1 / 0\n")
-    said = said_by(capsys, "build", "own.py")
-    assert mentions(said, "beside.py:1: ZeroDivisionError Own.fmu removed")
+    output = refusal(capsys, "build", "own.py")
+    assert mentions(output, "beside.py:1: ZeroDivisionError Own.fmu removed")
     assert not Path("Own.fmu").exists()
     assert all(other.exists() for other in others)
     Path("own.toml").write_text(SCENARIO)
     for name in ("Own.fmu", "own.toml"):
-        assert mentions(said_by(capsys, "run", name), "Own.fmu: auv-fmu build own.py")
+        assert mentions(refusal(capsys, "run", name), "Own.fmu: auv-fmu build own.py")
 
 
 def change(name: str) -> Callable[[], object]:
@@ -179,10 +179,10 @@ CHANGES = {
 
 
 def in_python(action: Callable[[], object]) -> str:
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as output:
         warnings.simplefilter("always")
         action()
-    return "\n".join(str(one.message) for one in said)
+    return "\n".join(str(one.message) for one in output)
 
 
 def test_an_fmu_older_than_its_script_is_never_run_in_silence(own: Path, capsys):
@@ -191,18 +191,18 @@ def test_an_fmu_older_than_its_script_is_never_run_in_silence(own: Path, capsys)
     Path("own.toml").write_text(SCENARIO)
     for doing, (action, culprit) in CHANGES.items():
         action()
-        said = {}
+        output = {}
         for arguments in (
             ["check", "own.toml"],
             ["run", "Own.fmu", "--stop-time", "0.1", "--step", "0.1", "--no-figures"],
         ):
             main([*arguments, *(["--out", "out"] if arguments[0] == "run" else [])])
-            said[" ".join(arguments)] = "".join(capsys.readouterr())
-        said["simulate"] = in_python(lambda: simulate("own.toml"))
-        said["load"] = in_python(lambda: load("Own.fmu"))
-        for command, text in said.items():
-            told = mentions(text, f"Own.fmu older {culprit} (auv-fmu build own.py)")
-            assert told == (culprit is not None), (doing, command, text)
+            output[" ".join(arguments)] = "".join(capsys.readouterr())
+        output["simulate"] = in_python(lambda: simulate("own.toml"))
+        output["load"] = in_python(lambda: load("Own.fmu"))
+        for command, text in output.items():
+            is_named = mentions(text, f"Own.fmu older {culprit} (auv-fmu build own.py)")
+            assert is_named == (culprit is not None), (doing, command, text)
         shutil.copy("Own.fmu", "Kept.fmu")
         assert in_python(lambda: load("Kept.fmu")) == ""
         for path, content in before.items():
@@ -218,8 +218,8 @@ def test_an_fmu_in_another_folder_of_the_project_is_compared_too(workplace: Path
     before = Path("out/deep/OwnLag.fmu").read_bytes()
     assert in_python(lambda: load("out/deep/OwnLag.fmu")) == ""
     change("own_lag/own_lag.py")()
-    [said] = in_python(lambda: load("out/deep/OwnLag.fmu")).splitlines()
-    [command] = re.findall(r"\(auv-fmu (.*?)\)", said)
+    [output] = in_python(lambda: load("out/deep/OwnLag.fmu")).splitlines()
+    [command] = re.findall(r"\(auv-fmu (.*?)\)", output)
     assert main(command.split()) == 0
     assert in_python(lambda: load("out/deep/OwnLag.fmu")) == ""
     assert Path("out/deep/OwnLag.fmu").read_bytes() != before
@@ -228,7 +228,7 @@ def test_an_fmu_in_another_folder_of_the_project_is_compared_too(workplace: Path
 def test_strict_refuses_an_fmu_that_is_older_than_its_script(own: Path, capsys):
     change("own.py")()
     Path("own.toml").write_text(SCENARIO)
-    assert mentions(said_by(capsys, "run", "own.toml", "--strict"), "Own.fmu older own.py")
+    assert mentions(refusal(capsys, "run", "own.toml", "--strict"), "Own.fmu older own.py")
     with pytest.raises(ValueError, match=r"Own\.fmu is older than own\.py"):
         simulate("own.toml", strict=True)
 

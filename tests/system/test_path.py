@@ -109,8 +109,8 @@ def test_check_says_of_a_path_what_a_run_would(workplace: Path, capsys, table, w
         '[components]\nplanner = "PathPlanner"\n[path]\nfile = "survey.csv"\n'
     )
     assert main(["check", "mine.toml"]) == (2 if why else 0)
-    said = capsys.readouterr().out
-    assert mentions(said, f"problem: planner: {why}") if why else "problem: " not in said
+    output = capsys.readouterr().out
+    assert mentions(output, f"problem: planner: {why}") if why else "problem: " not in output
 
 
 def test_another_model_of_the_name_is_left_alone(tmp_path: Path):

@@ -96,10 +96,10 @@ def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
     lines = ['"Time", "auv.plant::eta.x[REAL]","controller.fault","controller.saturation"']
     lines += [f"{t!r}, {x!r},False,tanh" for t, x in ((float(t), float(x)) for t, x in rows)]
     path.write_text("\n".join(lines))
-    said = verify(path, system, 1e-9)
-    assert tells(said, (2, 70, 1e-9, 20, 0.1, 2)) and "jacobi" in said
-    assert "outputs: controller.saturation" in said
-    assert mentions(said, "68, plant.eta.y,")
+    report = verify(path, system, 1e-9)
+    assert tells(report, (2, 70, 1e-9, 20, 0.1, 2)) and "jacobi" in report
+    assert "outputs: controller.saturation" in report
+    assert mentions(report, "68, plant.eta.y,")
 
 
 def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
@@ -107,9 +107,9 @@ def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
     result.rows[60:, result.columns.index("planner.y_d.z") + 1] += 1e-3
     result.rows[80:, result.columns.index("plant.eta.x") + 1] += 1.0
     write(result, tmp_path / "wrong.csv")
-    with pytest.raises(InputError, match=r"planner\.y_d\.z differs first, at t = 1\.2 s") as told:
+    with pytest.raises(InputError, match=r"planner\.y_d\.z differs first, at t = 1\.2 s") as error:
         verify(tmp_path / "wrong.csv", system, 1e-6)
-    assert f"wrong.csv: not a run of {system.name}, which --scenario names: in " in str(told.value)
+    assert f"wrong.csv: not a run of {system.name}, which --scenario names: in " in str(error.value)
 
 
 class OtherTool:
@@ -246,8 +246,8 @@ def test_table_of_a_tool_with_an_order_of_its_own_is_certified(
     path, system = tmp_path / "table.csv", closed_loop(native)
     tool = OtherTool(system, initial)
     tool.write(path, tool.rows([name.split("+") for name in order]))
-    said = verify(path, system, 1e-12, order, initial=initial)
-    compared, *_ = said.splitlines()
+    report = verify(path, system, 1e-12, order, initial=initial)
+    compared, *_ = report.splitlines()
     assert numbers_in(compared)[:6] == [66, 70, 1e-12, 200, 0.02, 4]
     assert ",".join(order) in compared
     assert compared.endswith("outputs") == (initial == "full")

@@ -229,8 +229,8 @@ def test_release_without_ziglang_is_refused(
     Path("sitecustomize.py").write_text("import sys; sys.modules['ziglang'] = None\n")
     monkeypatch.setenv("PYTHONPATH", str(workplace))
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
-    said = refused("release", "--out", "archives")
-    assert "no C compiler for " in said and "pip install 'auv-fmu[native]'" in said
+    message = refused("release", "--out", "archives")
+    assert "no C compiler for " in message and "pip install 'auv-fmu[native]'" in message
 
 
 def test_release_replaces_no_file_of_the_users(workplace: Path, refused: Callable[..., str]):

@@ -36,8 +36,8 @@ def test_controllers_follow_the_curve_as_the_remark_and_the_page_say(result):
         away[(table.time >= start) & (table.time < end)].max()
         for start, end in ((0, 40), (40, 80), (80, 120), (120, 281))
     ]
-    said = {"remus": (5.57, 0.81, 0.26, 0.18), "remus-pd": (1.46, 0.77, 0.27, 0.19)}
-    assert largest == pytest.approx(said[name], abs=0.006)
+    expected = {"remus": (5.57, 0.81, 0.26, 0.18), "remus-pd": (1.46, 0.77, 0.27, 0.19)}
+    assert largest == pytest.approx(expected[name], abs=0.006)
 
 
 def test_fins_are_at_their_limits_as_often_as_is_said(result):
@@ -48,8 +48,8 @@ def test_fins_are_at_their_limits_as_often_as_is_said(result):
         *(f"allocation.{k.replace('tau', 'tau_attained')}" for k in moments)
     )
     share = (np.abs(wanted - attained) > 1e-9).mean(axis=0)
-    said = {"remus": (0.33, 0.44), "remus-pd": (0.0, 0.0)}
-    assert share == pytest.approx(said[name], abs=0.01)
+    expected = {"remus": (0.33, 0.44), "remus-pd": (0.0, 0.0)}
+    assert share == pytest.approx(expected[name], abs=0.01)
 
 
 def test_fins_and_propeller_stay_within_their_limits(result):
@@ -106,13 +106,13 @@ def test_the_planner_knows_the_steady_turn_with_full_rudder(tmp_path):
         for name in ("plant.nu_r.u", "plant.nu_r.v", "plant.nu.r", "plant.tau_applied.r")
     )
     assert np.hypot(u, v) == pytest.approx(1.5, abs=0.01)
-    said = {str(name): value for name, value in read_scenario("remus").parameters.items()}
-    assert said["planner.d66"] == pytest.approx(N / r, rel=0.02)
-    assert said["planner.d22"] == pytest.approx(-said["planner.m11"] * u * r / v, rel=0.03)
-    assert said["planner.m22"] == said["planner.m33"] == said["planner.m11"]
+    expected = {str(name): value for name, value in read_scenario("remus").parameters.items()}
+    assert expected["planner.d66"] == pytest.approx(N / r, rel=0.02)
+    assert expected["planner.d22"] == pytest.approx(-expected["planner.m11"] * u * r / v, rel=0.03)
+    assert expected["planner.m22"] == expected["planner.m33"] == expected["planner.m11"]
     slowest = np.cos(np.radians(22.5))
     limits = np.multiply(slowest**2, (2.25, 1.61))
-    assert said["planner.tau_max"][1:] == pytest.approx(limits, abs=0.006)
+    assert expected["planner.tau_max"][1:] == pytest.approx(limits, abs=0.006)
 
 
 def test_the_planner_refuses_corners_beyond_the_rudder():

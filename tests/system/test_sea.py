@@ -20,8 +20,8 @@ from support.runs import compared, run
 
 def test_controllers_follow_the_survey_below_waves_as_its_remark_says():
     """In the first 25 s and in the last 40 s; with these seeds no command saturates."""
-    said = ((0.85, 0.30), 66.0), ((1.05, 0.33), 35.0)
-    for result, (distances, peak) in zip(compared("sea"), said, strict=True):
+    expected = ((0.85, 0.30), 66.0), ((1.05, 0.33), 35.0)
+    for result, (distances, peak) in zip(compared("sea"), expected, strict=True):
         away = np.linalg.norm(tracking_error(result), axis=1)
         found = [away[result.time < 25.0].max(), away[result.time > 60.0].max()]
         assert found == pytest.approx(distances, abs=0.006)

@@ -12,7 +12,7 @@ from support.tiers import slow
 #: Medians over seeds, and what 5 % and 95 % are below, by scenario, controller (PD or not) and
 #: number.
 ERROR_FROM_25 = "error from 25 s to 120 s [m]"
-SAID = {
+EXPECTED = {
     ("sea", False): {
         "error from 60 s to 100 s [m]": (0.43, 0.23, 0.83),
         "peak command u [N]": (86, 63, 117),
@@ -50,7 +50,7 @@ _ROUNDING = {"[m]": 0.0051, "[N]": 0.51, "[%]": 0.051}
 #: All runs for the bands of two scenarios, whose seeds decide most; of the others a few.
 RUNS = [
     ("sea", False, 3),
-    *slow(*((*case, 60 if case[0] in ("sea", "formation-lost-link") else 3) for case in SAID)),
+    *slow(*((*case, 60 if case[0] in ("sea", "formation-lost-link") else 3) for case in EXPECTED)),
 ]
 
 
@@ -58,7 +58,7 @@ RUNS = [
 def test_runs_with_other_seeds_are_within_the_bands_that_are_said(scenario, pd, n):
     """All bands to their last digit; of a few runs, each no farther out than the band is wide."""
     found = over_seeds(scenario, pd, n)
-    for name, (middle, low, high) in SAID[scenario, pd].items():
+    for name, (middle, low, high) in EXPECTED[scenario, pd].items():
         others = found[name][1:]
         rounding = _ROUNDING[name.split()[-1]] * (10 if scenario == "remus" else 1)
         if n == 60:

@@ -160,5 +160,5 @@ def test_without_a_compiler_it_is_said_what_to_install(tmp_path, monkeypatch, ca
     for command in ("run", "check"):
         arguments = ["--stop-time", "1", "--out", str(tmp_path / "o")] if command == "run" else []
         assert main([command, str(fmu), *arguments]) == 2
-        said = capsys.readouterr()
-        assert "gcc or clang" in said.out + said.err
+        output = capsys.readouterr()
+        assert "gcc or clang" in output.out + output.err

@@ -245,7 +245,7 @@ def test_files_of_a_run_differ_only_in_their_times(folders, name, start):
 def test_commands_take_the_system_and_the_result(folders, name, start, capsys, tmp_path):
     """`check`, `verify`, `export`, `plot`, and `run` on in another format from a checkpoint."""
     output, *_ = SIGNALS[name]
-    said = []
+    outputs = []
     for one in (start, 0.0):
         folder = folders(name, one)
         ssp, result = str(folder / "x.ssp"), str(folder / "plain")
@@ -255,7 +255,7 @@ def test_commands_take_the_system_and_the_result(folders, name, start, capsys, t
         table = f"{result}/result.csv"
         assert main(["verify", table, "--scenario", ssp]) == 0
         shift = re.sub(r"t = \S+ to \S+ s|t = \S+,", "", capsys.readouterr().out)
-        said.append(shift.replace(str(folder), ""))
+        outputs.append(shift.replace(str(folder), ""))
         whole = Path(table).read_text()
         if name in ("vehicle", "linear"):
             # The others cannot save their states.
@@ -265,7 +265,7 @@ def test_commands_take_the_system_and_the_result(folders, name, start, capsys, t
         assert main(["plot", result, output, "--out", str(tmp_path / f"{one:g}.svg")]) == 0
         assert main(["export", ssp, "--out", str(tmp_path / f"{one:g}")]) == 0
         assert load(tmp_path / f"{one:g}" / "x.ssp").start_time == one
-    assert said[0] == said[1]
+    assert outputs[0] == outputs[1]
 
 
 def test_a_table_that_begins_before_the_run_does_not_belong_to_it(folders, refused):

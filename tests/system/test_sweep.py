@@ -64,8 +64,8 @@ def test_option_that_makes_many_runs_sooner_is_named(scenario, kind, n, option, 
     monkeypatch.setattr("orchestrator.studies.sweep.machines_compiler", lambda: "cc")
     runs = {"scenario": scenario, "vary": {"plant.eta0.y": {"from": 0, "to": 1, "n": n}}}
     space = Space(study_of("many", runs), {scenario: load_scenario(scenario, kind)})
-    said = faster(space, FmuEngine(space.prepared), Means(kind=kind))
-    assert mentions(said, f"{n:,} {kind} {option}") if option else said == ""
+    lines = faster(space, FmuEngine(space.prepared), Means(kind=kind))
+    assert mentions(lines, f"{n:,} {kind} {option}") if option else lines == ""
     assert faster(space, BatchEngine({}), Means(kind=kind)) == ""
 
 
@@ -125,8 +125,8 @@ def test_cautions_of_runs_are_in_the_table_and_counted_at_the_end(workplace, cap
             == 0
         )
         lines = capsys.readouterr().err.splitlines()
-        said = "\n".join(line for line in lines if "warning: fig5: " in line)
-        expected.append(", ".join(kind for word, kind in words.items() if word in said) or None)
+        text = "\n".join(line for line in lines if "warning: fig5: " in line)
+        expected.append(", ".join(kind for word, kind in words.items() if word in text) or None)
     assert len({*expected}) == 3
     study = {"scenario": "fig5", "stop_time": 10.0, "vary": values}
     tables = [sweep(study, engine=engine, out=engine, workers=1) for engine in (FMU, BATCH)]
