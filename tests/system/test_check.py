@@ -266,9 +266,7 @@ def test_another_vehicle_in_some_components_is_named(workplace, capsys, values):
     wrong = [f"info: {info}"] if info else []
     assert lines(capsys) == [*wrong, "auv.toml: no problems found"]
     assert main(["run", "auv.toml", "--no-figures"]) == 0
-    assert capsys.readouterr().err == (
-        "" if output is None else f"auv-fmu: warning: auv: {output}\n"
-    )
+    assert capsys.readouterr().err == (f"auv-fmu: warning: auv: {info}\n" if info else "")
     assert main(["run", "auv.toml", "--no-figures", "--strict"]) == (2 if info else 0)
 
 

@@ -94,9 +94,7 @@ def outputs_of_libcosim(folder: Path, *names: str) -> np.ndarray:
     if find_spec("libcosimpy") is None:
         pytest.skip("libcosimpy is not installed")
     arguments = [sys.executable, "-c", LIBCOSIM, str(folder), str(STEPS), *names]
-    output = subprocess.run(
-        arguments, capture_output=True, text=True, check=True, timeout=60
-    ).stdout
+    done = subprocess.run(arguments, capture_output=True, text=True, check=True, timeout=60)
     # It logs to the same stream.
     rows = [line.split()[1:] for line in done.stdout.splitlines() if line.startswith("row ")]
     return np.array([[float.fromhex(value) for value in row] for row in rows])
