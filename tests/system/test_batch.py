@@ -204,7 +204,7 @@ MISTAKES: list[tuple[str, dict[str, Any]]] = [
 
 
 @pytest.mark.parametrize(("mistake", "order"), zip(MISTAKES, cycle(ORDERS), strict=False))
-def test_what_fmus_refuse_is_refused(mistake, order):
+def test_the_engine_refuses_the_same_as_the_fmus(mistake, order):
     name, values = mistake
     point = Point(5, name, values, 3.0, 0.02, order)
     [[one], [other]] = (engine.outcomes([point]) for engine in engines(name))
@@ -239,7 +239,7 @@ def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:
 """
 
 
-def test_what_a_loop_would_never_end_with_is_refused_before(workplace):
+def test_values_that_would_make_a_loop_endless_are_refused(workplace):
     statements = {"scaled": "x = 3.0 * x", "halved": "while abs(x) > 1.0:\n        x = x / 2.0"}
     for name, statement in statements.items():
         Path(f"{name}.py").write_text(COMPONENT.replace("STATEMENT", statement))
@@ -276,7 +276,7 @@ def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
         ('coupling = "linear"\n', "coupling linear"),
     ],
 )
-def test_what_no_program_can_be_is_refused_by_name(workplace, refused, content, words):
+def test_scenarios_outside_the_engine_are_refused_by_name(workplace, refused, content, words):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     Path("own.toml").write_text(f"stop_time = 1.0\n{content}")
     Path("mine.toml").write_text('scenario = "own.toml"\nengine = "batch"\n')

@@ -276,7 +276,7 @@ def test_refusal_is_told(tmp_path: Path):
     assert ran.stderr == "plant refuses its step after 0 steps\n"
 
 
-def test_what_single_precision_cannot_have_is_refused(
+def test_scenarios_beyond_single_precision_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ):
     options = ["--format", "c", "--single", "--out", str(tmp_path / "one")]

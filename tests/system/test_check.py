@@ -60,7 +60,7 @@ def changed(archive: Path, *changes: tuple[str, str], without: str = "") -> Path
 
 
 @pytest.mark.parametrize("name", ["fig4", "auv.ssp", "MotionPlanner.fmu"])
-def test_nothing_is_wrong_with_ours(dist, workplace, capsys, name):
+def test_there_are_no_problems_in_files_of_the_bundle(dist, workplace, capsys, name):
     if "." in name:
         shutil.copy(dist / name, workplace)
     assert main(["check", name]) == 0
@@ -199,7 +199,7 @@ def test_a_forgotten_connection_of_an_archive_is_named(workplace, capsys):
     assert lines(capsys)[0] == "info: nothing feeds or sets controller.dy.z"
 
 
-def test_who_could_feed_a_group_is_named_if_it_is_one(tmp_path):
+def test_a_single_source_of_a_group_is_proposed(tmp_path):
     """A wire has a group of ports on each side; two that have the outputs are one too many.
 
     What feeds the group of another component is not proposed.
@@ -289,7 +289,7 @@ LFS = b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a2146\nsize 12
         ("bad.ssp", LFS, "`git lfs pull`"),
     ],
 )
-def test_what_cannot_be_read_is_one_problem(workplace, capsys, name, content, words):
+def test_an_unreadable_file_is_one_problem(workplace, capsys, name, content, words):
     if content is not None:
         Path(name).write_bytes(content)
     assert main(["check", name]) == 2

@@ -295,7 +295,7 @@ def test_texts_keep_their_numbers(tmp_path, isolate):
     assert resumed.ending.messages == ()
 
 
-def test_an_fmu_that_does_not_restore_all_of_its_state_is_told(tmp_path):
+def test_an_fmu_that_does_not_restore_its_whole_state_is_reported(tmp_path):
     """Its own process has come two steps beyond the checkpoint."""
     system = others.system_of(others.build(tmp_path, "FORGETS", WITH_STATES))
     stopped(system)

@@ -14,7 +14,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim import write_osp, write_ssp
+from orchestrator.cosim import write_ssp
 from orchestrator.cosim.formats.osp import OSP_STRUCTURE
 from orchestrator.machine.errors import InputError
 from support.archives import archive, component, described, fmu, system, variable
@@ -110,18 +110,6 @@ def test_osp_file_gives_the_numbers_of_libcosim(osp: Path):
     assert np.ptp(expected, axis=0)[[0, 1, 2, 3, 5]].min() > 0.05
 
 
-def test_what_is_written_for_libcosim_is_read_again(dist: Path, tmp_path: Path):
-    """Components, connections, parameters and steps of the closed loop."""
-    system = load("fig5")
-    write_osp(system, tmp_path)
-    again = load(tmp_path)
-    assert set(again.connections) == set(system.connections)
-    assert again.parameters == system.parameters
-    assert (again.step, again.start_time or 0.0) == (system.step, system.start_time or 0.0)
-    digests = [{n: c.digest for n, c in one.components.items()} for one in (system, again)]
-    assert digests[0] == digests[1]
-
-
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
@@ -138,7 +126,7 @@ def test_what_is_written_for_libcosim_is_read_again(dist: Path, tmp_path: Path):
         (f"<BaseStepSize>{STEP}<", "<BaseStepSize>fast<", "BaseStepSize 'fast'"),
     ],
 )  # fmt: skip
-def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, why):
+def test_an_osp_file_that_cannot_be_run_is_refused_by_name(osp: Path, old, new, why):
     assert old in OSP
     (osp / OSP_STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
     with pytest.raises(InputError) as error:
@@ -146,7 +134,7 @@ def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, 
     assert mentions(str(error.value), why) and "\n" not in str(error.value)
 
 
-def test_what_of_an_osp_file_changes_is_a_warning(osp: Path):
+def test_changes_to_an_osp_file_are_warnings(osp: Path):
     text = OSP.replace("fixedStep", "ecco").replace(f'"{2 * STEP}"', f'"{2.03 * STEP}"')
     (osp / OSP_STRUCTURE).write_text(text, encoding="utf-8")
     with (

@@ -237,7 +237,7 @@ def test_friction_acts_against_the_velocity_through_the_water(tmp_path):
     np.testing.assert_allclose(table["plant.nu_r.u"], table["plant.nu.u"] - 0.3, atol=1e-12)
 
 
-def test_what_happens_is_said_recorded_and_kept(workplace: Path, capsys):
+def test_events_are_reported_recorded_and_drawn(workplace: Path, capsys):
     Path("mine.toml").write_text(
         'figure = "overlay"\nstop_time = 1.0\n'
         '[[events]]\nat = 0.3\nfor = 0.2\nlose = "controller.tau.r"\nlabel = "no yaw"\n'
@@ -277,7 +277,7 @@ def test_a_run_that_an_event_stops_has_not_failed(workplace: Path, capsys):
     assert x[-1] < 1.9 <= min(x[:-1])
 
 
-def test_what_a_system_has_not_is_said_where_it_goes_without(workplace: Path, capsys):
+def test_a_system_without_the_events_of_its_scenario_is_reported(workplace: Path, capsys):
     left = "fault-sensor: only the system is used, without the scenario's events"
     assert main(["export", "fault-sensor", "--kind", "native"]) == 0
     assert f"auv-fmu: warning: {left}" in capsys.readouterr().err.splitlines()
@@ -300,7 +300,7 @@ EXPECTED = {
 
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", EXPECTED)
-def test_what_is_said_of_the_scenarios_is_so_in_every_draw_of_the_noise(name, seed):
+def test_remarks_are_true_in_every_draw_of_the_noise(name, seed):
     [event] = read_scenario(name).events
     begin, end = event["at"], event["at"] + event.get("for", 0.0)
     tables = compared(name, parameters={"plant.noise.seed": seed})

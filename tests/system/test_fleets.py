@@ -95,7 +95,7 @@ def test_events_happen_to_nested_components(ssp: Path, tmp_path: Path):
     [["--connectors"], ["--flat"], ["--format", "osp"]],
     ids=["nested", "flat", "osp"],
 )
-def test_what_is_exported_runs_as_it_did(ssp: Path, tmp_path: Path, options: list[str]):
+def test_an_exported_fleet_has_the_same_rows(ssp: Path, tmp_path: Path, options: list[str]):
     assert main(["export", str(ssp), "--out", str(tmp_path / "x"), *options]) == 0
     exported = tmp_path / "x" if "osp" in options else tmp_path / "x" / "fleet.ssp"
     rows = run(exported, tmp_path / "r")

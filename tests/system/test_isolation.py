@@ -109,7 +109,7 @@ def test_rows_equal_a_run_in_one_process(dist: Path):
         ),
     ],
 )
-def test_what_an_isolated_fmu_does_ends_the_run_in_one_line(c_fmu, mark, act, words):
+def test_failures_of_an_isolated_fmu_end_the_run_in_one_line(c_fmu, mark, act, words):
     """An FMU that does not return is ended after a time limit."""
     waits = 0.5 if act in ("HANGS", "SPINS") else 20.0
     table = run_isolated(foreign_system(c_fmu, act, at=0.1), waits)
@@ -176,7 +176,7 @@ def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, is
 
 
 @pytest.mark.slow
-def test_what_is_written_is_shown_and_what_is_said_is_kept_within_bounds(c_fmu, capfd):
+def test_output_is_shown_and_messages_are_bounded(c_fmu, capfd):
     """And none of it speaks to the terminal."""
     assert run_isolated(foreign_system(c_fmu, "WRITES", at=0.46)).failure is None
     shown = capfd.readouterr().err
@@ -327,7 +327,7 @@ def test_an_alarm_ends_a_run_with_its_rows(archives, workplace):
         ),
     ],
 )
-def test_what_a_python_slave_does_to_the_interpreter_costs_no_rows(workplace, act):
+def test_a_python_slave_that_damages_the_interpreter_costs_no_rows(workplace, act):
     """Although it does so in every step, the result and its messages are written."""
     (workplace / "slave").mkdir()
     system = System("slave", {"a": read_component("a", build_slave(workplace, act))}, ())

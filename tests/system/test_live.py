@@ -450,7 +450,7 @@ def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
         ("vehicles = 2\nstop_time = 2001.0\n", "more than 100,000 steps"),
     ],
 )
-def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, capsys):
+def test_scenarios_that_the_page_cannot_run_are_refused_in_one_line(text, why, tmp_path, capsys):
     (tmp_path / "mine.toml").write_text(text)
     assert main(["live", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "page.html")]) == 2
     error = capsys.readouterr().err
@@ -470,7 +470,7 @@ def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, ca
         (assembly.bundled, "assembly.shutil.which", "Node.js"),
     ],
 )
-def test_what_makes_a_part_is_named_where_it_is_missing(
+def test_missing_tools_of_the_page_are_named(
     make: Callable[[], object], lacking, wanted, monkeypatch
 ):
     monkeypatch.setattr(f"orchestrator.live.{lacking}", lambda *_: None)

@@ -146,7 +146,7 @@ def test_outputs_are_the_columns_of_a_run_bit_for_bit(workplace: Path, name: str
     check(play(path), expected(name), outputs(path))
 
 
-def test_of_fmi_3_it_gives_the_same_bits(workplace: Path):
+def test_in_fmi_3_it_has_the_same_bits(workplace: Path):
     path = exported("sea", "--fmi", "3")
     assert validate_fmu(str(path)) == []
     check(play(path), expected("sea"), outputs(path))
@@ -278,7 +278,7 @@ def test_feedthrough_goes_along_the_connections(workplace: Path):
     }  # fmt: skip
 
 
-def test_what_is_wrong_says_which_component_and_why(workplace: Path):
+def test_a_failure_names_the_component_and_the_reason(workplace: Path):
     path = exported("fig4")
     result = simulate(path, {"fig4.disturbance.A_f": 1e200}, stop_time=1.0)
     assert mentions(str(result.failure), "plant: state finite")

@@ -31,14 +31,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return tmp_path_factory.mktemp("relays")
 
 
-#: Each takes what the one before it shows at once; the first takes it from the last.
-RING = {"a.u": "c.g", "b.u": "a.g", "c.u": "b.g"}
-GAINS = {"a.a": 0.5, "b.a": -1.0, "c.a": 0.25, "a.c": 1.0, "b.c": 2.0, "c.c": -1.0}
-
-
-def ring(folder: Path, declares: bool = True, gain: float = 0.5, **others: object) -> System:
-    fmus = {name: relay(folder, declares) for name in "abc"}
-    return system_of(fmus, RING, GAINS | {"a.a": gain}, **others)
+def ring(folder: Path, declares: bool = True, **others: object) -> System:
+    """Three relays with feedthrough; each takes the output of the one before it."""
+    wires = {"a.u": "c.g", "b.u": "a.g", "c.u": "b.g"}
+    values = {"a.a": 0.5, "b.a": -1.0, "c.a": 0.25, "a.c": 1.0, "b.c": 2.0, "c.c": -1.0}
+    return system_of({name: relay(folder, declares) for name in "abc"}, wires, values, **others)
 
 
 @pytest.mark.parametrize("declares", [True, False])
@@ -55,7 +52,7 @@ def test_a_ring_is_opened_before_its_first_component_and_one_line_says_so(folder
 
 
 def test_a_ring_that_feeds_another_is_opened_first(folder):
-    """It stands after it; what it feeds gets nothing late but what its own ring is opened for."""
+    """Although it is listed later: inputs from it are not late."""
     fmus = {name: relay(folder) for name in "abcde"}
     wires = {"a.u": "b.g", "b.u": "a.g", "a.v": "d.g", "c.u": "d.g", "d.u": "c.g", "e.u": "b.g"}
     system = system_of(fmus, wires)

@@ -101,7 +101,7 @@ def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("owner", ["root", "other"])
-def test_what_another_user_has_put_into_the_cache_is_not_run(
+def test_files_of_another_user_in_the_cache_are_not_run(
     dist, workplace, planted, open_folder, other, owner
 ):
     if owner == "other":
@@ -115,7 +115,7 @@ def test_what_another_user_has_put_into_the_cache_is_not_run(
         assert not read_cached("loop", loop.key_of())
 
 
-def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, open_folder):
+def test_files_of_another_user_are_not_run_after_the_folder_is_mended(planted, open_folder):
     subprocess.run(["chmod", "-R", "go-w", open_folder / "auv-fmu"], check=True)
     for folder in (open_folder / "auv-fmu").iterdir():
         os.chown(folder, 0, 0)

@@ -93,7 +93,7 @@ def test_a_scenario_that_cannot_run_says_why_and_breaks_nothing(text):
     assert "lost.fmu: no such file" in reason
 
 
-def test_what_is_wrong_in_the_paper_is_there_with_the_gain_check(text, dist):
+def test_errata_and_the_gain_check_are_in_the_report(text, dist):
     titles = re.findall("^#### .+$", errata(), re.MULTILINE)
     assert len(titles) > 20
     assert all(f"\n{title}\n" in text for title in titles)

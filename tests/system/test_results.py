@@ -96,7 +96,7 @@ def test_record_names_the_fmu_that_ran(workplace: Path, change: Callable[[Path],
     assert record["fmus"]["a"] == {"file": fmu.name, "sha256": digest, "kind": "native"}
 
 
-def test_an_fmu_that_has_another_content_is_another_one(workplace: Path):
+def test_an_fmu_with_another_content_is_unpacked_again(workplace: Path):
     """Also where it has the name, the place, the size and the time of the one before."""
     fmu = build(workplace)
     folder, digest = unpack(fmu)
@@ -110,7 +110,7 @@ def test_an_fmu_that_has_another_content_is_another_one(workplace: Path):
     assert unpack(copy) == again
 
 
-def test_who_takes_fmus_along_takes_those_that_were_read(workplace: Path):
+def test_an_engine_takes_along_the_fmus_that_were_read(workplace: Path):
     fmu = build(workplace)
     experiment = Experiment(0.2, 0.1)
     prepared = Prepared(Scenario("s"), make_plan(system_of(fmu), experiment))

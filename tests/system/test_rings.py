@@ -120,7 +120,7 @@ def test_a_ring_of_components_without_a_ring_of_ports_is_not_late(folder):
             np.testing.assert_array_equal(table[output], table["s.y0"])
 
 
-def test_what_hangs_on_a_ring_takes_its_new_outputs(folder):
+def test_components_fed_by_a_ring_take_its_new_outputs(folder):
     """Wherever it stands; it is in no ring itself."""
     parts = {"sink": Part(D=[[0.0, 0.0], [3.0, 0.0]]), **gains(0.5, 0.9)}
     wires = {**WIRES, "sink.u0": "a.y1"}
@@ -137,7 +137,7 @@ def test_what_hangs_on_a_ring_takes_its_new_outputs(folder):
     [("feedthrough", [0.0, 0.2, 0.42, 0.66]), ("gauss-seidel", [0.0, 0.22, 0.46, 0.72])],
 )
 @pytest.mark.parametrize("names", ["abs", "sba"])
-def test_of_two_solved_rings_neither_is_the_first(folder, names, order, taken):
+def test_the_order_of_two_solved_rings_does_not_matter(folder, names, order, taken):
     """b takes a new value from a without feedthrough, in any order of the two."""
     itself = [[0.0, 0.0], [0.5, 1.0]]
     parts = {
@@ -187,7 +187,7 @@ def test_a_delayed_ring_whose_values_grow_is_run_until_they_are_no_longer_finite
 
 
 @pytest.mark.parametrize("growth", [0.0, 0.3])
-def test_what_grows_as_it_should_is_let_grow(folder, growth):
+def test_values_that_grow_without_a_fault_are_accepted(folder, growth):
     """A ramp, and exponentials of time, on a ring that is delayed."""
     parts = gains(0.5, 0.9) | {"s": Part(A=[[growth, 1.0], [0.0, growth]], C=np.eye(2), x=[0, 1])}
     system = system_of({name: linear(folder) for name in "sab"}, parts, WIRES)

@@ -99,7 +99,7 @@ def test_a_file_that_no_run_wrote_is_refused_before_the_first_step(name, capsys)
     assert Path(f"r/{name}.~1~").read_bytes() == mine[f"r/{name}"]
 
 
-def test_what_the_user_changed_is_the_users(capsys):
+def test_a_file_that_the_user_changed_is_not_replaced(capsys):
     assert main(RUN) == 0
     with Path("r/result.csv").open("a") as file:
         file.write("mine")

@@ -101,7 +101,7 @@ def test_arrays_are_the_ones_that_fmpy_gets(fmu, tmp_path, way):
     assert [held[f"a.M[{i},{j}]"] for i in (1, 2) for j in (1, 2, 3)] == [1, 2, 0.25, -7.5, 5, 6]
 
 
-def test_an_fmu_that_lacks_what_no_run_calls_runs(tmp_path):
+def test_functions_that_no_run_calls_may_be_missing(tmp_path):
     table = run(typed.system_of(typed.build(tmp_path, "-DLACKS"), parameters={"a.complains": True}))
     assert len(table) == STEPS + 1
     # Percent signs are the message's own: in FMI 3.0 it is complete.
@@ -208,7 +208,7 @@ def test_versions_feed_each_other(fmu, tmp_path, way, fed):
         ("new.y_String", "old.on"),
     ],
 )
-def test_what_would_lose_a_value_is_refused_with_both_types(fmu, tmp_path, source, target):
+def test_a_wire_that_could_lose_a_value_is_refused_with_both_types(fmu, tmp_path, source, target):
     fmus = {"new": fmu, "old": others.build(tmp_path)}
     system = connected("both", fmus, {target: source})
     types = [
@@ -219,7 +219,7 @@ def test_what_would_lose_a_value_is_refused_with_both_types(fmu, tmp_path, sourc
     assert mentions(str(error.value), " ".join([source, target, *types]))
 
 
-def test_what_is_left_alone_is_said_and_refused_where_it_is_asked_for(fmu, tmp_path, capsys):
+def test_ignored_variables_are_reported_and_refused_on_request(fmu, tmp_path, capsys):
     table = run(typed.system_of(fmu))
     assert mentions(table.ending.messages[0], "a bytes, clock")
     for name, words in (
