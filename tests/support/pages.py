@@ -12,7 +12,7 @@ import numpy as np
 
 
 def unpacked(page: str, element: str) -> list[bytes]:
-    """What an element of a page holds."""
+    """Unpack the content of an element of a page."""
     [text] = re.findall(rf'<script [^>]*id="{element}">(.*?)</script>', page, re.DOTALL)
     return [gzip.decompress(b64decode(word)) for word in text.split()]
 

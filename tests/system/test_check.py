@@ -13,7 +13,7 @@ import pytest
 
 from orchestrator.commands import check
 from orchestrator.commands.main import main
-from orchestrator.cosim import Connection, PortName, System, read_component, write_ssp
+from orchestrator.cosim import Connection, PortName, System, read_component
 from orchestrator.cosim.formats.ssp import STRUCTURE
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.loading import load, load_scenario
@@ -189,14 +189,6 @@ def test_a_forgotten_wire_is_named(workplace, capsys):
         assert caught[0].filename == __file__
     with pytest.raises(InputError, match=r"controller\.dy"):
         load("pd.toml", strict=True)
-
-
-def test_a_forgotten_connection_of_an_archive_is_named(workplace, capsys):
-    system = load("fig5-pd")
-    wires = tuple(c for c in system.connections if c.target.port != "dy.z")
-    [path] = write_ssp(replace(system, connections=wires), workplace)
-    assert main(["check", str(path)]) == 0
-    assert lines(capsys)[0] == "info: nothing feeds or sets controller.dy.z"
 
 
 def test_a_single_source_of_a_group_is_proposed(tmp_path):

@@ -20,7 +20,6 @@ from hypothesis import strategies as st
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim import Connection, Linear, Mapped, PortName, Value, read_ssp, write_ssp
-from orchestrator.exchange.verify import verify
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from support import typed
@@ -263,20 +262,3 @@ def test_a_mapping_to_what_its_target_cannot_hold_is_refused_by_its_number(fmu: 
     ends = PortName.read(f"a.y_{kind}"), PortName.read(f"b.u_{kind}")
     system = replace(system, connections=(Connection(*ends, Mapped(((0, target),))),))
     assert mentions(" ".join(map(str, system.problems())), f"{target} {kind}")
-
-
-def test_a_table_with_every_type_is_verified(fmu: Path, tmp_path: Path):
-    """Also with a second column of the time, as a tool writes it that names all variables."""
-    values = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
-    system = replace(typed.system_of(fmu, parameters=values), step=H)
-    table = simulate(system, stop_time=4 * H).save(tmp_path) / "result.csv"
-    assert mentions(verify(table, system, 0.0, verbose=True), "19 y_String")
-    lines = table.read_text(encoding="utf-8").splitlines()
-    doubled = [f"{line.partition(',')[0]},{line}" for line in lines]
-    table.write_text("\n".join(doubled), encoding="utf-8")
-    verify(table, system, 0.0)
-    doubled[2] = doubled[2].replace("0.125,", "0.1250001,", 1)
-    table.write_text("\n".join(doubled), encoding="utf-8")
-    with pytest.raises(InputError) as error:
-        verify(table, system, 0.0)
-    assert mentions(str(error.value), "line 3 0.125")

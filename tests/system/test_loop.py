@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmus.kinds import NATIVE
 from orchestrator.cosim import (
     Alter,
     Event,
@@ -22,17 +21,13 @@ from orchestrator.cosim import (
     Isolation,
     Linear,
     PortName,
-    Run,
     System,
     Table,
     choose_loop,
     make_plan,
     simulate_plan,
 )
-from orchestrator.cosim.fmi.instance import Ended
-from orchestrator.cosim.hooks.hook import NEVER
 from orchestrator.machine.errors import StartError
-from orchestrator.runs.loading import load
 from orchestrator.runs.wiring import closed_loop
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
@@ -263,40 +258,3 @@ def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
     )
     assert 1000 < len(full) < len(whole) < 2001
     assert np.array_equal(whole.time, np.arange(len(whole)) * H)
-
-
-class Pushes:
-    """Surge force of zero from one time to another, and the end of the run at a third [steps]."""
-
-    def __init__(self, begin: int, end: int, stop: int = NEVER) -> None:
-        self._acts = {begin: self._begin, end: self._end, stop: self._stop}
-        self.times: list[int] = []
-
-    def act(self, run: Run) -> int:
-        self.times.append(run.made)
-        if act := self._acts.pop(run.made, None):
-            act(run)
-        return min(self._acts, default=NEVER)
-
-    def _begin(self, run: Run) -> None:
-        run.overrides.override(PortName.read("plant.tau.u"), 0.0)
-
-    def _end(self, run: Run) -> None:
-        run.overrides.release(PortName.read("plant.tau.u"))
-
-    def _stop(self, run: Run) -> None:
-        raise Ended("enough")
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize("order", Experiment.ORDERS)
-def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
-    pushes = Pushes(10, 620, 650)
-    table = run_table(load("fig4", NATIVE), Experiment(14.0, 0.02, order), loop, hooks=[pushes])
-    assert pushes.times == [0, 10, 620, 650]
-    assert (table.failure, table.ending.remark) == (None, "ended at t = 13 s: enough")
-    assert len(table) == 651
-    force, command = table.step_values("plant.tau.u", "controller.tau.u").T
-    free = np.r_[1:10, 620:650]
-    np.testing.assert_array_equal(force[10:620], 0.0)
-    np.testing.assert_array_equal(force[free], command[free - (order == "jacobi")])

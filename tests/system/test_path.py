@@ -59,19 +59,6 @@ def test_fmu_gives_the_closed_form_at_whatever_step(native: Path, step: float):
             np.testing.assert_allclose(found, expected, rtol=1e-12, atol=1e-12)
 
 
-def test_path_from_a_table_is_passed_at_its_times(workplace: Path, native: Path):
-    (workplace / "survey.csv").write_text(TABLE)
-    (workplace / "mine.toml").write_text(
-        '[components]\nplanner = "PathPlanner"\n[path]\nfile = "survey.csv"\n'
-    )
-    scenario = read_scenario(str(workplace / "mine.toml"))
-    result = run(closed_loop(native, scenario), 66.0, 0.02)
-    y_d = result.group("planner.y_d.x", "planner.y_d.y", "planner.y_d.z")
-    np.testing.assert_allclose(y_d[0], (3, 6, 0), atol=1e-12)
-    np.testing.assert_allclose(y_d[round(28.0 / 0.02)], (13, 6, 2), atol=1e-12)
-    np.testing.assert_allclose(y_d[-1], (13, 16, 2), atol=1e-12)
-
-
 @pytest.mark.parametrize(
     ("places", "why"),
     [

@@ -15,7 +15,7 @@ from orchestrator.paper.claims import (
     EFFORT_PROPOSED,
     total_variation_until,
 )
-from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.indices import metrics_of
@@ -53,15 +53,6 @@ def run(native: Path) -> Runner:
 def variation(result: Table) -> np.ndarray:
     """Total variation of each actuator."""
     return np.array(metrics_of(result).found()["total_variation"])
-
-
-def test_all_figures_are_there():
-    figures = ["3a", "3b", "4", "5", "5-pd", "6", "6-pd", "7a", "7b", "7c"]
-    others = [
-        "current-step", "fault-sensor", "fault-thruster", "formation-change",
-        "formation-lost-link", "formation-v", "path", "remus", "remus-pd", "sea",
-    ]  # fmt: skip
-    assert names() == sorted([*(f"fig{name}" for name in figures), *others])
 
 
 def test_fig3a_follows_the_analytic_solution(run: Runner):

@@ -258,18 +258,6 @@ def test_events_set_one_element_and_keep_the_others(fmu, way):
     assert table["a.y_Int64"].tolist() == [(2**62 + 1) * is_large for is_large in large]
 
 
-@EVERY_WAY
-def test_a_ring_of_both_versions_is_solved(fmu, tmp_path, way):
-    through = ('index="2" dependencies=""', 'index="2" dependencies="1"')
-    fmus = {"new": fmu, "old": others.build(tmp_path, change=through)}
-    wires = {"old.u": "new.w[1]", "new.v[3]": "old.y"}
-    values = {"new.M[1,3]": -3.0, "new.v[1]": 6.0, "old.gain": 2.0}
-    table = run(connected("ring", fmus, wires, values), **way)
-    assert table.failure is None
-    # y = 2 w, w = 6 - 3 y.
-    assert table["old.y"] == pytest.approx(12 / 7, rel=1e-9)
-
-
 @pytest.mark.parametrize("of", ["Float64", "Float32"])
 def test_a_ring_of_one_type_is_solved_by_its_derivatives_or_without(fmu, tmp_path, of):
     plain = typed.build(tmp_path, change=('providesDirectionalDerivatives="true"', ""))
