@@ -82,8 +82,7 @@ def test_every_mistake_in_a_description_is_reported(dist: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "name",
-    [STRUCTURE, f"./{STRUCTURE}", "a/../../outside", "..\\outside", "/outside"],
+    "name", [STRUCTURE, f"./{STRUCTURE}", "a/../../outside", "..\\outside", "/outside"]
 )
 def test_archive_that_tools_unpack_differently_is_refused(dist, tmp_path, name):
     archive = tmp_path / "odd.ssp"

@@ -274,12 +274,7 @@ def wired(workplace: Path) -> Path:
 
 def test_a_scenario_wires_single_ports_beside_groups(dist: Path, wired: Path):
     found = {str(wire.target): str(wire.source) for wire in load(wired).connections}
-    assert found == {
-        "g.u": "t.y",
-        "x.w[1]": "t.z[2]",
-        "x.in.a": "t.out.a",
-        "x.in.b": "t.out.b",
-    }
+    assert found == {"g.u": "t.y", "x.w[1]": "t.z[2]", "x.in.a": "t.out.a", "x.in.b": "t.out.b"}
 
 
 @pytest.mark.parametrize(

@@ -91,9 +91,7 @@ def test_events_happen_to_nested_components(ssp: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    "options",
-    [["--connectors"], ["--flat"], ["--format", "osp"]],
-    ids=["nested", "flat", "osp"],
+    "options", [["--connectors"], ["--flat"], ["--format", "osp"]], ids=["nested", "flat", "osp"]
 )
 def test_an_exported_fleet_has_the_same_rows(ssp: Path, tmp_path: Path, options: list[str]):
     assert main(["export", str(ssp), "--out", str(tmp_path / "x"), *options]) == 0

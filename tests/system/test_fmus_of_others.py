@@ -332,12 +332,7 @@ def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variabil
     table = run(system, hooks=[Playback(input_table)], **way)
     inputs = np.array(rows, dtype=[("time", float), ("u", float)])
     theirs = fmpy.simulate_fmu(
-        str(fmu),
-        stop_time=1.0,
-        output_interval=0.1,
-        input=inputs,
-        output=["y"],
-        validate=False,
+        str(fmu), stop_time=1.0, output_interval=0.1, input=inputs, output=["y"], validate=False
     )
     # Its last step may be one of a rounding error.
     np.testing.assert_allclose(table["a.y"][1:], theirs["y"][1 : len(table)], atol=1e-12)

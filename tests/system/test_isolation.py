@@ -399,10 +399,7 @@ def test_an_fmu_that_ended_fatally_is_loaded_again(archives: Path):
     )
     assert (
         process.stdout.splitlines()
-        == [
-            "stopped at t = 0.1 s: bad: beyond repair",
-            "stopped at t = 0.2 s: bad: beyond repair",
-        ]
+        == ["stopped at t = 0.1 s: bad: beyond repair", "stopped at t = 0.2 s: bad: beyond repair"]
         * 2
     ), process.stderr
 

@@ -56,8 +56,7 @@ def test_scenario_is_the_same(dist: Path, native: Path, scenario: str):
 
 
 @pytest.mark.parametrize(
-    ("scenario", "order"),
-    [("fig4", "feedthrough"), *slow(("fig5-pd", "jacobi"))],
+    ("scenario", "order"), [("fig4", "feedthrough"), *slow(("fig5-pd", "jacobi"))]
 )
 def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str, order: str):
     stop_time = read_scenario(scenario).stop_time

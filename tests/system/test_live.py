@@ -224,10 +224,7 @@ def with_same_functions(folder: Path, place: Path) -> Path:
     return made
 
 
-@pytest.mark.parametrize(
-    ("last", "end"),
-    [("chattering", 20.0), ("refused", 18.0)],
-)
+@pytest.mark.parametrize(("last", "end"), [("chattering", 20.0), ("refused", 18.0)])
 def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Parts, tmp_path):
     outcome, run = both(ALL.replace("LAST", ENDS[last]), parts, tmp_path)
     ending, table = compare(run, outcome, tmp_path)

@@ -81,11 +81,7 @@ def check(found: Any, result: Result, names: list[str]) -> None:
 
 def play(path: Path, step: float = H) -> Any:
     return fmpy.simulate_fmu(
-        str(path),
-        stop_time=STEPS * H,
-        step_size=step,
-        output_interval=step,
-        output=outputs(path),
+        str(path), stop_time=STEPS * H, step_size=step, output_interval=step, output=outputs(path)
     )
 
 

@@ -1,9 +1,9 @@
 """The Reference FMUs of the Modelica Association give the results that are published in them.
 
 The variable REFERENCE_FMUS names a folder with a release of github.com/modelica/Reference-FMUs, or
-with the products of its own build: FMUs in `2.0` and `3.0`. Both solve with a fixed step of their own,
-explicit Euler's, so the master has to come to the same numbers bit for bit. No result uses event
-mode. The counter of Stair is ten after nine seconds, where it ends the run.
+with the products of its own build: FMUs in `2.0` and `3.0`. Both solve with explicit Euler's fixed
+steps, so the master has to come to the same numbers bit for bit. No result uses event mode. The
+counter of Stair is ten after nine seconds, where it ends the run.
 """
 
 from __future__ import annotations

@@ -10,11 +10,7 @@ import numpy as np
 import pytest
 
 from orchestrator.cosim import PortName, Table
-from orchestrator.paper.claims import (
-    EFFORT_PD,
-    EFFORT_PROPOSED,
-    total_variation_until,
-)
+from orchestrator.paper.claims import EFFORT_PD, EFFORT_PROPOSED, total_variation_until
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.cautions import velocities_reaching
