@@ -10,10 +10,7 @@ import json
 import resource
 import signal
 import subprocess
-import sys
 import time
-from datetime import datetime, timedelta, tzinfo
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +20,6 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.commands.streams import INTERRUPTED
-from orchestrator.machine.disk import hold_lock
-from orchestrator.runs import result
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.result import read_result
 from orchestrator.runs.tables import read_rows
@@ -345,32 +340,3 @@ def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
         f"with the results in {left.name}"
     )
     assert rows(left)[0, 0] == 0.0
-
-
-@pytest.mark.parametrize("command", [["run", "fig4"], ["export", "fig4"], ["report"]])
-def test_a_folder_that_another_process_writes_into_is_left_alone(workplace, capsys, command):
-    (workplace / "r").mkdir()
-    with hold_lock(workplace / "r"):
-        assert main([*command, "--out", "r"]) == 2
-    assert "into r;" in capsys.readouterr().err
-    assert contents(workplace) == {}
-
-
-def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys):
-    """With the bar, which a terminal would show."""
-    jump = count(step=-1000)
-
-    class Jumping(datetime):
-        @classmethod
-        def now(cls, tz: tzinfo | None = None) -> datetime:
-            return datetime.now(tz) + timedelta(hours=next(jump))
-
-    monkeypatch.setattr(time, "time", lambda now=time.time: now() + 3600 * next(jump))
-    monkeypatch.setattr(result, "datetime", Jumping)
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    begun = time.monotonic()
-    assert main([*RUN, "20"]) == 0
-    taken = time.monotonic() - begun
-    recorded = json.loads(Path("results/fig4/run.json").read_text())["seconds"]
-    assert 0.0 < recorded <= taken
-    assert len(rows(workplace / "results" / "fig4")) == 1001

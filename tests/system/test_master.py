@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fmpy.ssp.ssd import read_ssd
 
 from orchestrator.cosim import (
     Connection,
@@ -24,9 +23,7 @@ from orchestrator.cosim import (
     choose_loop,
     make_plan,
     read_component,
-    read_ssp,
     simulate_plan,
-    ssp_bytes,
 )
 from orchestrator.cosim.fmi.binary import check_place
 from orchestrator.cosim.stages import arrange
@@ -218,13 +215,3 @@ def test_broken_and_missing_fmus_are_refused(tmp_path: Path, dist: Path):
     alone = System("alone", {"plant": read_component("plant", hollow)}, ())
     with pytest.raises(InputError, match=r"hollow\.fmu"):
         run(alone, 1.0, 0.02)
-
-
-def test_ssp_holds_the_system_it_was_made_from(system, dist):
-    """Also valid against the schema: fmpy's reader checks it."""
-    read_ssd(str(dist / "auv.ssp"))
-    again = read_ssp(dist / "auv.ssp")
-    assert set(again.connections) == set(system.connections)
-    assert list(again.components) == list(system.components)
-    assert (again.stop_time, again.step) == (100.0, 0.02)
-    assert ssp_bytes(system) == (dist / "auv.ssp").read_bytes()

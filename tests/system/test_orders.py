@@ -112,22 +112,6 @@ def test_steps_follow_from_the_request_and_otherwise_from_the_fmus(folder):
     assert decimations_of(system_of({"a": relay(folder)}, stop_time=1.0)) == (0.02, {"a": 1})
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"step": 0.02, "steps": {"plant": 0.03}}, "plant 0.03 s"),
-        ({"steps": {"plant": -1.0}}, "plant -1.0"),
-        ({"steps": {"plnt": 0.1}}, "'plnt' plant"),
-        ({"steps": {"plant": 0.0123457}}, "0.0123457, 0.02 s"),
-    ],
-)
-def test_steps_that_cannot_be_are_refused(options, words):
-    system = replace(load("fig4", NATIVE), step=None)
-    with pytest.raises(InputError) as error:
-        simulated(system, **options)
-    assert mentions(str(error.value), words)
-
-
 @pytest.mark.parametrize("isolation", [None, Isolation(20.0)])
 def test_no_step_is_logged(folder, isolation):
     ending = simulate_plan(

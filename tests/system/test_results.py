@@ -5,25 +5,18 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import pickle
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim import Experiment, make_plan
-from orchestrator.machine.errors import InputError
 from orchestrator.machine.user_files import unpack
-from orchestrator.runs.preparation import Prepared
-from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import read_columns, read_rows
-from orchestrator.studies.engine import FmuEngine, Point
 from support.others import build, system_of
 from support.texts import mentions
 
@@ -108,32 +101,6 @@ def test_an_fmu_with_another_content_is_unpacked_again(workplace: Path):
     copy = workplace / "copy.fmu"
     copy.write_bytes(fmu.read_bytes())
     assert unpack(copy) == again
-
-
-def test_an_engine_takes_along_the_fmus_that_were_read(workplace: Path):
-    fmu = build(workplace)
-    experiment = Experiment(0.2, 0.1)
-    prepared = Prepared(Scenario("s"), make_plan(system_of(fmu), experiment))
-    engine, run = FmuEngine({"s": prepared}), Point(0, "s", {}, 0.2, 0.1)
-    assert list(pickle.loads(pickle.dumps(engine)).outcomes([run])) == list(engine.outcomes([run]))
-    replace_by_another(fmu)
-    with pytest.raises(InputError, match=r"plain\.fmu"):
-        pickle.dumps(engine)
-    assert (
-        Prepared(Scenario("s"), make_plan(system_of(fmu), experiment)).identity != prepared.identity
-    )
-
-
-def test_record_tells_by_its_identity_whether_numbers_are_the_same():
-    def recorded(name: str, **how: object) -> dict[str, Any]:
-        result = simulate("fig4", stop_time=0.1, kind="native", **how)
-        return json.loads((result.save(name) / "run.json").read_text())
-
-    first = recorded("first")
-    same = [recorded("loop", loop="python"), recorded("isolated", isolate=True)]
-    assert {record["identity"] for record in same} == {first["identity"]}
-    other = recorded("other", steps={"controller": 0.04})
-    assert other["identity"] != first["identity"]
 
 
 def peak_memory(*arguments: str) -> int:

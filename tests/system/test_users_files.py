@@ -11,7 +11,6 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.runs.tables import read_rows
-from support.live import needs_npm
 from support.machine import contents
 from support.texts import mentions
 
@@ -58,32 +57,6 @@ def test_a_companion_of_any_name_has_a_folder_of_its_own(stem):
         assert np.array_equal(rows(path), made.rows)
 
 
-@needs_npm
-@pytest.mark.usefixtures("script")
-def test_a_result_from_elsewhere_is_only_read(capsys):
-    """It brings hidden folders, links, and a record that names the user's files."""
-    assert main(RUN) == 0
-    for path in Path("r").glob(".*"):
-        path.unlink()
-    mine = put("home/.ssh/authorized_keys", "home/thesis.tex")
-    record = json.loads(Path("r/run.json").read_text())
-    record["files"] += ["home/thesis.tex", "link/thesis.tex", "link/.ssh/authorized_keys"]
-    Path("r/.whole/link/.ssh").mkdir(parents=True)
-    Path("r/.whole/link/.ssh/authorized_keys").write_text("theirs")
-    Path("r/.whole/run.json").write_text(json.dumps(record))
-    Path("r/link").symlink_to("../home")
-    Path("r/run.json").write_text(json.dumps(record))
-    before = contents(Path())
-    assert main(["plot", "r", "--out", "plot.png"]) == 0
-    assert main(["view", "r"]) == 0
-    after = contents(Path())
-    assert {name: after.get(name) for name in before} == before
-    assert after.keys() - before.keys() == {"plot.png", "r/view.html"}
-    assert mine.items() <= after.items()
-    assert main(["run", "fig3a", "--stop-time", "0.2", "--no-figures", "--out", "r"]) == 2
-    assert "r/result.csv" in capsys.readouterr().err
-
-
 @pytest.mark.parametrize(
     "name", ["result.csv", "result.parquet", "run.json", "checkpoint/rows.bin"]
 )
@@ -97,19 +70,6 @@ def test_a_file_that_no_run_wrote_is_refused_before_the_first_step(name, capsys)
     assert contents(Path()) == mine
     assert main([*command, "--force"]) == 0
     assert Path(f"r/{name}.~1~").read_bytes() == mine[f"r/{name}"]
-
-
-def test_a_file_that_the_user_changed_is_not_replaced(capsys):
-    assert main(RUN) == 0
-    with Path("r/result.csv").open("a") as file:
-        file.write("mine")
-    changed = Path("r/result.csv").read_bytes()
-    assert main(RUN) == 2
-    assert Path("r/result.csv").read_bytes() == changed
-    capsys.readouterr()
-    Path("r/result.csv").write_bytes(changed.removesuffix(b"mine").replace(b"0.02,", b"0.03,", 1))
-    assert main(["plot", "r", "--out", "plot.png"]) == 0
-    assert "warning: r/result.csv was changed since the run wrote it" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
