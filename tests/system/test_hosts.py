@@ -269,10 +269,10 @@ def test_ecos_command_line_runs_the_ssp_with_an_empty_environment(dist: Path, tm
     shutil.copy(Path(package, "binaries", "ecos"), command)
     command.chmod(0o755)
     process = subprocess.run(
-        [command, "simulate", "--path", dist / "auv.ssp", "--stopTime", "1", "--stepSize", "0.02"],
+        [command, "simulate", "--path", dist / "auv.ssp", "--stopTime", "5", "--stepSize", "0.02"],
         cwd=tmp_path, env={"LD_LIBRARY_PATH": f"{sys.prefix}/lib:{LIBDIR}"},
         check=False, capture_output=True, text=True,
     )  # fmt: skip
     assert process.returncode == 0, process.stdout + process.stderr
     report = verify(tmp_path / "auv.csv", closed_loop(dist), 1e-5)
-    assert "to 1 s, in jacobi order, outputs read after values are passed on" in report
+    assert "to 5 s, in jacobi order, outputs read after values are passed on" in report
