@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 from zipfile import ZipFile
 
 import pytest
@@ -96,34 +94,42 @@ def test_all_mistakes_of_a_study_are_said(tmp_path, capsys):
     assert main(["check", str(file)]) == 0
 
 
+FIG5 = "scenario = 'fig5'\n"
+
+
 @pytest.mark.parametrize(
-    ("content", "culprits"),
+    ("text", "culprits"),
     [
-        ({"scenario": ["fig55", "none.ssp"]}, ["fig55", "none.ssp"]),
+        ("scenario = ['fig55', 'none.ssp']", ["fig55", "none.ssp"]),
         (
-            {"vary": {"plant.m11": ["heavy"], "nobody.x": [1], "plant.m22": [20, 20.0]},
-             "parameters": {"plant.m99": 3, "plant.d11": "x"}},
+            f"{FIG5}[vary]\nplant.m11 = ['heavy']\nnobody.x = [1]\nplant.m22 = [20, 20.0]\n"
+            "[parameters]\nplant.m99 = 3\nplant.d11 = 'x'\n",
             ["plant.m11 heavy", "nobody", "plant.m22 20 twice", "m99", "plant.d11 x"],
         ),
-        ({"vary": {"plant.m11": [20]}, "sample": {"n": 4, "range": {"plant.ell": [-1, 1],
-          "controller.saturation": [1, 2]}}}, ["plant.ell -1", "controller.saturation vary"]),
-        ({"vary": {"plant.m11": [20]}, "stop_time": -1.0}, ["-1 s"]),
-        ({"vary": {"step": [0.02, 0.0]}}, ["step 0 s"]),
         (
-            {"scenario": "fault-sensor", "engine": "batch", "vary": {"plant.m11": [20]},
-             "figures": {"a": {"kind": "influence", "show": "my_index"}}},
+            f"{FIG5}vary.plant.m11 = [20]\n[sample]\nn = 4\n"
+            "range = { plant.ell = [-1, 1], controller.saturation = [1, 2] }\n",
+            ["plant.ell -1", "controller.saturation vary"],
+        ),
+        (f"{FIG5}stop_time = -1.0\nvary.plant.m11 = [20]\n", ["-1 s"]),
+        (f"{FIG5}vary.step = [0.02, 0.0]\n", ["step 0 s"]),
+        (
+            "scenario = 'fault-sensor'\nengine = 'batch'\nvary.plant.m11 = [20]\n"
+            "figures.a = { kind = 'influence', show = 'my_index' }\n",
             ["events batch", "my_index"],
         ),
-        ({"scenario": ["fig4", "fig4"], "vary": {"plant.m11": [20]}}, ["fig4 twice"]),
-        ({"vary": {"controller.saturation": ["tanh"]},
-          "figures": {"a": {"kind": "influence", "show": "late_error"}}}, ["lacks x"]),
+        ("scenario = ['fig4', 'fig4']\nvary.plant.m11 = [20]\n", ["fig4 twice"]),
+        (
+            f"{FIG5}vary.controller.saturation = ['tanh']\n"
+            "figures.a = { kind = 'influence', show = 'late_error' }\n",
+            ["lacks x"],
+        ),
     ],
-)  # fmt: skip
-def test_check_of_a_study_finds_what_sweep_finds(content, culprits, workplace, capsys):
+)
+def test_check_of_a_study_finds_what_sweep_finds(text, culprits, workplace, capsys):
     """All of it, where `sweep` says the first, and does nothing."""
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    file = workplace / "mine.toml"
-    file.write_text(toml_text({"scenario": "fig5", **content}))
+    Path("mine.toml").write_text(text)
     assert main(["check", "mine.toml"]) == 2
     output = [line.removeprefix("problem: ") for line in capsys.readouterr().out.splitlines()]
     assert len(output) == len(culprits)
@@ -135,23 +141,9 @@ def test_check_of_a_study_finds_what_sweep_finds(content, culprits, workplace, c
     assert {path.name for path in workplace.iterdir()} == {"mine.toml"}
 
 
-def toml_text(content: dict[str, Any]) -> str:
-    """Write a table in TOML, whose strings, numbers and lists are written as in JSON."""
-
-    def inline(value: Any) -> str:
-        if not isinstance(value, dict):
-            return json.dumps(value)
-        return "{ " + ", ".join(f'"{key}" = {inline(one)}' for key, one in value.items()) + " }"
-
-    tables = {key: value for key, value in content.items() if isinstance(value, dict)}
-    lines = [f"{key} = {json.dumps(content[key])}" for key in content.keys() - tables]
-    return "\n".join([*lines, *(f"{key} = {inline(value)}" for key, value in tables.items())])
-
-
 def test_a_sample_that_is_not_even_is_an_info(workplace, capsys):
     pytest.importorskip("scipy", reason="needs the extra `studies`")
-    content = {"scenario": "fig5", "sample": {"n": 1000, "range": {"plant.ell": [0.3, 0.4]}}}
-    Path("mine.toml").write_text(toml_text(content))
+    Path("mine.toml").write_text(f"{FIG5}[sample]\nn = 1000\nrange.plant.ell = [0.3, 0.4]\n")
     assert main(["check", "mine.toml"]) == 0
     assert "info: " in capsys.readouterr().out
 
