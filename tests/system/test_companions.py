@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.cosim import PortName, Table
+from orchestrator.cosim import PortName
 from orchestrator.runs.loading import load_scenario
 from orchestrator.runs.preparation import prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.vehicle.signals import STANDARD
-from support.runs import PD
+from support.runs import PD, compared
 from support.texts import mentions
 
 WAYPOINTS = "x,y,z\n0,0,-2\n3,0,-2\n3,3,-2\n"
@@ -28,13 +28,9 @@ def pair_of(text, **request):
     return with_companion(prepare(*load_scenario("mine.toml", "native"), request), request)
 
 
-def runs_of(text, stop_time=1.0):
-    tables = []
-    for prepared in pair_of(f"stop_time = {stop_time}\n{text}"):
-        table = Table()
-        prepared.run([table])
-        tables.append(table)
-    return tables
+def runs_of(text):
+    Path("mine.toml").write_text(f"stop_time = 1.0\n{text}")
+    return compared("mine.toml")
 
 
 @pytest.mark.parametrize(
