@@ -182,10 +182,10 @@ def test_a_run_with_a_companion_and_figures(capsys):
 
 @pytest.mark.slow
 def test_killed_before_any_call_that_changes_the_disk():
-    """Before every third one."""
+    """Before every fifth one."""
     arguments = ["fig4", "--no-figures", "--stop-time", "0.16", "--checkpoint-every", "0.08"]
     assert run(*arguments, out="whole") == 0
-    for n in count(0, 3):
+    for n in count(0, 5):
         out = f"killed{n}"
         if not killed_at(n, lambda out=out: run(*arguments, out=out)):
             break
@@ -246,16 +246,12 @@ def test_a_signal_leaves_the_rows_and_the_checkpoint(loop, capsys):
     ],
 )
 def test_another_run_is_refused(left, capsys, change, words):
-    before = contents(Path("r"))
+    before = contents(Path("r/checkpoint"))
     assert run(*LEFT, *change, "--resume", out="r") == 2
     [line] = capsys.readouterr().err.splitlines()
     assert line.startswith("auv-fmu: r/checkpoint belongs to another run: ")
     assert mentions(line, words)
-    assert contents(Path("r/checkpoint")) == {
-        name.removeprefix("checkpoint/"): content
-        for name, content in before.items()
-        if name.startswith("checkpoint/")
-    }
+    assert contents(Path("r/checkpoint")) == before
 
 
 WITH_STATES = (
@@ -303,6 +299,12 @@ def test_an_fmu_that_does_not_restore_its_whole_state_is_reported(tmp_path):
     [message] = resumed.ending.messages
     assert mentions(message, "a.heard 1.9 s resumed")
     assert len(resumed) == 21
+
+
+def test_an_interval_longer_than_any_run():
+    arguments = ["fig4", "--stop-time", "0.1", "--no-figures", "--checkpoint-every", "1e300"]
+    assert run(*arguments, out="r") == 0
+    assert not Path("r/checkpoint").exists()
 
 
 def test_from_python(left):

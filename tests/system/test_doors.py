@@ -209,6 +209,9 @@ def test_an_unpacked_ssp_is_what_the_archive_is(tmp_path: Path, name: str):
 
 
 def test_a_folder_runs_from_within_and_may_lack_a_stop_time(workplace: Path, capsys):
+    """A scenario wins over a folder of its name."""
+    Path("fig4").mkdir()
+    assert "plant" in load("fig4").components
     [path] = write_ssp(load(relay(workplace)), workplace)
     Path("inside").mkdir()
     with ZipFile(path) as content:

@@ -69,7 +69,9 @@ def test_nested_components_are_set_ordered_and_apart(ssp: Path, tmp_path: Path):
 
 
 def test_events_happen_to_nested_components(ssp: Path, tmp_path: Path):
-    events = tmp_path / "events.toml"
+    """And a table feeds an input."""
+    events, table = tmp_path / "events.toml", tmp_path / "water.csv"
+    table.write_text("time,auv2.plant.water.y\n0,0\n0.8,-0.05\n")
     events.write_text(
         '[[events]]\nwhen = "auv1.plant.eta.z > 1e-4"\noverride = {auv1.controller.tau.u = 3.0}\n'
         '[[events]]\nat = 0.3\nbias = {"auv2.plant.y" = [0.1, 0.2, 0.3]}\n'
@@ -78,12 +80,13 @@ def test_events_happen_to_nested_components(ssp: Path, tmp_path: Path):
         '[[events]]\nat = 0.6\nreset = "auv2.controller"\n'
         '[[events]]\nat = 0.7\nlose = ["auv1.disturbance.tau_w", "auv2.disturbance.tau_w.u"]\n'
     )
-    run(ssp, tmp_path / "r", "--events", str(events))
+    run(ssp, tmp_path / "r", "--events", str(events), "--inputs", str(table))
     events = json.loads((tmp_path / "r" / "run.json").read_text())["events"]
     assert len(events) == 6
     result = read(tmp_path / "r")
     assert result["auv1.plant.tau.u"][-1] == 3.0 != result["auv2.plant.tau.u"][-1]
     assert result["auv2.plant.water.x"][-1] == 0.2 and result["auv1.plant.water.x"][-1] == 0.0
+    assert result["auv2.plant.water.y"][-1] == pytest.approx(-0.05, rel=1e-12)
     assert len(np.unique(result["auv1.controller.y.x"][-10:])) == 1
     assert len(np.unique(result["auv2.controller.y.x"][-10:])) > 1
     assert (result["auv1.plant.tau_w.v"][-5:] == 0.0).all()

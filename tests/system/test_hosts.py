@@ -194,6 +194,7 @@ STD = {PortName("plant", "noise.std"): 0.5}
         ("fmpy-ssp", STD, {}, "plant.noise.std = 0.5"),
         ("fmpy", {}, {"start_time": 10.0}, "start time"),
         ("fmpy", {}, {"steps": {"controller": 0.06}}, "longer steps"),
+        ("ecos", {}, {"start_time": 10.0}, "at 10 s"),
     ],
 )
 def test_host_refuses_what_it_does_not_apply(dist: Path, host: str, values, changed, words: str):
@@ -259,6 +260,11 @@ def test_hosts_apart_are_run_where_they_are_asked_for(
     monkeypatch.setattr(exchange, "compare", lambda _, hosts, *__, **___: asked.extend(hosts) or [])
     assert main(["hosts", *options.split()]) == 0
     assert asked == expected
+
+
+def test_version_of_fmi_that_a_host_does_not_run_is_reported(dist3: Path):
+    [verdict] = compare(closed_loop(dist3), ["sofirpy"], 3, 0.02)
+    assert "FMI 3.0" in str(verdict.failure)
 
 
 @pytest.mark.skipif(find_spec("ecospy") is None, reason="ecospy is not installed")

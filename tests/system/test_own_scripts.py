@@ -100,6 +100,8 @@ def test_a_script_runs_with_the_packages_of_researchers(workplace: Path):
 
 
 def test_a_script_runs_with_its_modules_and_data_files(own: Path):
+    assert main(["build", "own.py", "--out", "again"]) == 0
+    assert Path("again/Own.fmu").read_bytes() == Path("Own.fmu").read_bytes()
     with zipfile.ZipFile("Own.fmu") as archive:
         names = {re.sub(r"_[0-9a-f]{12}", "", name) for name in archive.namelist()}
     assert {name.removeprefix("resources/") for name in names} >= {*FILES} - {"data/unused.txt"}
