@@ -293,6 +293,7 @@ def test_no_module_in_a_folder_with_a_system_or_an_fmu_is_run(workplace, capsys,
     assert not Path("ran").exists()
 
 
+@pytest.mark.slow
 def test_a_component_of_ones_own_is_described_and_what_fmi_says_of_that_is_told(
     workplace, capsys, monkeypatch
 ):
