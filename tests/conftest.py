@@ -26,7 +26,7 @@ from ready_wheel import write_fmus
 # Slow machines pass, and the same tree gives the same result every time.
 settings.register_profile("patient", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("patient")
-# The same and more of them, beside the slow tests.
+# More of the same examples, together with the slow tests.
 settings.register_profile("thorough", settings.get_profile("patient"), max_examples=200)
 # New examples every time, and many.
 settings.register_profile("search", deadline=None, max_examples=2000)
@@ -54,7 +54,7 @@ _SKIPPED = "auv-fmu/skipped"
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Note what a test would be skipped without."""
+    """Note the requirements of a test."""
     for mark in item.iter_markers("skipif"):
         needed, found = _MISSING.subn("", mark.kwargs["reason"])
         item.user_properties += [("needs", needed)] * found
@@ -62,7 +62,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what the last run has skipped, for `-m skipped`."""
+    """Mark tests that the last run skipped, for `-m skipped`."""
     if cache := getattr(config, "cache", None):
         skipped = {*cache.get(_SKIPPED, [])}
         for item in items:
@@ -71,7 +71,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say what not every machine has, and how many tests ran with it or were skipped, and why."""
+    """Report requirements of the tests that ran, and reasons for the skipped ones."""
     passed, skipped = (terminalreporter.stats.get(name, []) for name in ("passed", "skipped"))
     if cache := getattr(terminalreporter.config, "cache", None):
         nodes = sorted({report.nodeid for report in skipped})
@@ -103,7 +103,7 @@ def _own_cache(shared: Path) -> None:
 
 @pytest.fixture(autouse=True)
 def _same_imports() -> Iterator[None]:
-    """Forget the folders that a test imported from: a later one may want a name that is free."""
+    """Restore `sys.path`: later tests may import modules of the same names."""
     before = [*sys.path], [*sys.path_hooks]
     yield
     sys.path[:], sys.path_hooks[:] = before

@@ -105,7 +105,7 @@ def test_packages_import_what_they_may(package):
         # The proof never runs inside an FMU.
         if package == "auv_fmu" and name[:1] == ("proof",):
             allowed = allowed | {"numpy"}
-        # The face of the product names what it imports on first use.
+        # The package exports functions of the orchestrator on first use.
         if (package, name) == ("auv_fmu", ()):
             allowed = allowed | {"orchestrator"}
         for imported in imports(path):
@@ -119,7 +119,7 @@ def test_packages_import_what_they_may(package):
 def test_imports_run_downwards(package):
     floors = FLOORS[package]
     for path, name in modules(package):
-        # The package's own face hands on names of every floor.
+        # The package itself exports names of every room.
         if not name or name == ("__main__",):
             continue
         own = floors.index(room(package, name))
@@ -152,7 +152,7 @@ def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
             assert {one[0] for one in imports(path)}.isdisjoint(("auv_fmu", "fmus")), path
 
 
-#: So many names are taken through the door of the master. Fewer is better.
+#: Most names that may be imported from `orchestrator.cosim`; fewer are better.
 MOST_NAMES = 74
 
 

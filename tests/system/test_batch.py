@@ -70,7 +70,7 @@ def sampled(name: str) -> list[Point]:
 
 
 def bits(rows: np.ndarray) -> np.ndarray:
-    """As integers: -0.0 is not 0.0."""
+    """Rows as integers, in which -0.0 differs from 0.0."""
     return np.ascontiguousarray(rows).view(np.int64)
 
 
@@ -80,7 +80,7 @@ def changes(values: Mapping[str, Any]) -> dict[Any, Any]:
 
 @pytest.mark.parametrize("name", ready_studies())
 def test_runs_of_studies_equal_the_fmus(name):
-    """All indices; why a run fails is left to the FMUs."""
+    """All indices are equal; the FMUs report why a run fails."""
     runs = sampled(name)
     batch, fmus = engines(*read_study(name).scenario)
     for one, other in zip(batch.outcomes(runs), fmus.outcomes(runs), strict=True):
@@ -100,7 +100,7 @@ def compare_with_fmus(name: str, point: Point, own: tuple[OwnIndex, ...] = ()) -
     assert table.failure is None
     assert len(table.columns) >= 40
     assert table.header.parameters == expected.header.parameters
-    # A program that comes to its end has refused nothing.
+    # A program has no column for refusals.
     faults = {f"{part}.fault" for part in system.components}
     assert {*expected.columns} - {*table.columns} == faults
     rows = np.column_stack([expected.time, expected.group(*table.columns)])
@@ -162,7 +162,7 @@ def test_components_with_longer_steps_equal_the_fmus(tmp_path, slow, order):
     compare_with_fmus(str(path), Point(0, "", NOISY, 4.0, 0.02, order))
 
 
-#: Systems that have parts more, or fewer.
+#: Systems with more or fewer parts.
 OTHERS = {
     "two planners": '[components]\nmore = "MotionPlanner"\n',
     "an open loop": '[wires]\n"controller.y" = false\n',
@@ -303,7 +303,7 @@ def test_a_users_index_is_the_same_in_both_engines(name):
 
 
 def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
-    """Before its first run as after it, if its program is prepared."""
+    """Before and after its first run, if its program is prepared."""
     batch = BatchEngine(systems("fig4"))
     run = Point(0, "fig4", {}, 0.5, 0.02)
     batch.prepare(run)

@@ -20,11 +20,11 @@ from support.texts import mentions
 #: Communication step of the scenarios [s].
 H = 0.02
 
-#: Scenarios and for how many steps they are compared; the first one's noise begins a new pair of
-#: all words of its generator in them.
+#: Scenarios, and their numbers of compared steps; in the first, the generator of the noise renews
+#: all its words.
 SCENARIOS = {"fig4": 1000, "path": 400, "sea": 100}
 
-#: Those that single precision can have.
+#: Scenarios with single precision.
 SINGLE = ["fig4", "path"]
 
 GCC, ARM_GCC, QEMU = map(shutil.which, ("gcc", "arm-none-eabi-gcc", "qemu-system-arm"))
@@ -36,7 +36,7 @@ CORTEX_M = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16
 SUPPORT = Path(__file__).parents[1] / "support"
 
 STRICT = ("-std=c99", "-Wall", "-Wextra", "-pedantic", "-Werror")
-#: As FMUs are compiled, so that no result is another one.
+#: Options with which FMUs are compiled, too, so that all results are equal.
 EXACT = ("-ffp-contract=off", "-fno-builtin")
 
 #: Two programs in one.
@@ -149,7 +149,7 @@ def test_single_precision_has_no_double_and_the_same_motion(programs: Path, name
 
 @needs_gcc
 def test_single_precision_over_the_whole_of_fig4(programs: Path):
-    """Less than a millimetre after 100 s, and a 50th of that in how it follows its reference."""
+    """The position differs by less than 1 mm after 100 s, the tracking error by a 20th of that."""
     columns, rows = printed(programs / "fig4-single", 5000)
     result = expected("fig4", 5000)
     for name, bound in (("plant.eta.x", 1e-3), ("plant.eta.y", 1e-3), ("controller.e.x", 5e-5)):
@@ -191,7 +191,7 @@ def test_program_has_no_variables_and_calls_only_mathematics(
 
 
 def deepest_call(graph: Path, root: str) -> int:
-    """Bytes of the stack below a function, of a program in which nothing calls itself."""
+    """Bytes of the stack below a function, in a program without recursion."""
     text = graph.read_text(encoding="utf-8")
     own = {
         title: int(size[1]) if (size := re.search(r"(\d+) bytes", label)) else 0
@@ -218,7 +218,7 @@ def deepest_call(graph: Path, root: str) -> int:
 def test_header_tells_the_bytes_that_a_program_takes(
     programs: Path, tmp_path: Path, name: str, command: tuple[str, ...]
 ):
-    """As compilers say of a simulation, and of the stack."""
+    """The size of a simulation, and of the stack, as compilers report them."""
     folder, upper = programs / name, stem(name).upper()
     header = (folder / f"{stem(name)}.h").read_text(encoding="utf-8")
     size = int(str(re.search(rf"{upper}_BYTES = (\d+)", header)[1]))  # type: ignore[index]

@@ -19,7 +19,7 @@ from support.texts import mentions, numbers_in, tells
 
 FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
 
-#: As the document of the draft has it, version 1.0.0-beta.1.
+#: A manifest as in the draft, version 1.0.0-beta.1.
 MANIFEST = """\
 <?xml version="1.0" encoding="UTF-8"?>
 <fmiReferences xmlns:fmi-ls="http://fmi-standard.org/fmi-ls-manifest"
@@ -82,7 +82,7 @@ FILES = {
 
 
 def carrying(fmu: Path, files: Mapping[str, str | None]) -> str:
-    """A copy of an FMU that carries files besides; the name of the copy."""
+    """Copy an FMU, add files, and return the name of the copy."""
     path = shutil.copyfile(fmu, fmu.with_name("lag.fmu"))
     with ZipFile(path, "a") as archive:
         for name, text in files.items():
@@ -92,7 +92,7 @@ def carrying(fmu: Path, files: Mapping[str, str | None]) -> str:
 
 
 def test_results_that_are_right_are_certified(tmp_path: Path, capsys):
-    """One output of two, in eleven rows; the results are of the exponential."""
+    """One output of two, in eleven rows, from the exponential function."""
     assert main(["verify", carrying(linear(tmp_path), FILES)]) == 0
     head, verdict, last = capsys.readouterr().out.splitlines()
     assert head == "lag.fmu: FMI-LS-REF 1.0.0-beta.1"
@@ -159,7 +159,7 @@ def test_rows_between_steps_and_at_other_times(tmp_path: Path, capsys):
 
 
 def test_result_without_an_experiment_belongs_to_the_description(tmp_path: Path, capsys):
-    """As the Reference FMUs have it: x' = 0 from x(0) = 0 until the stop time."""
+    """As in the Reference FMUs: x' = 0 from x(0) = 0 until the stop time."""
     manifest = MANIFEST.replace("tests/smoke.exp", "out.csv").replace('"experiment"', '"result"')
     files = {"fmi-ls-manifest.xml": manifest, "out.csv": "time,y0\n0,0\n2,0\n4,0\n"}
     assert main(["verify", carrying(linear(tmp_path), files)]) == 0

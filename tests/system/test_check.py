@@ -1,4 +1,4 @@
-"""`auv-fmu check`: everything at once, and nothing is run."""
+"""`auv-fmu check` reports all problems at once, and runs nothing."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def lines(capsys: pytest.CaptureFixture[str]) -> list[str]:
 
 
 def changed(archive: Path, *changes: tuple[str, str], without: str = "") -> Path:
-    """An archive with other words in its description, or without one of its files."""
+    """Copy an archive, with changes in its description, or without one of its files."""
     path = Path(archive.name)
     with ZipFile(archive) as old, ZipFile(path, "w") as new:
         for name in old.namelist():
@@ -127,7 +127,7 @@ FIG5 = "scenario = 'fig5'\n"
     ],
 )
 def test_check_of_a_study_finds_what_sweep_finds(text, culprits, workplace, capsys):
-    """All of it, where `sweep` says the first, and does nothing."""
+    """`check` reports all problems, `sweep` the first; it makes no run."""
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     Path("mine.toml").write_text(text)
     assert main(["check", "mine.toml"]) == 2

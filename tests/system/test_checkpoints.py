@@ -37,7 +37,7 @@ def run(*arguments: str, out: str) -> int:
 
 
 def result(folder: str) -> dict[str, bytes]:
-    """All files of a result but the records."""
+    """All files of a result except the records."""
     files = contents(Path(folder))
     return {name: files[name] for name in files if Path(name).name != _RECORD}
 
@@ -93,7 +93,7 @@ def left(one_left: Path) -> None:
     ids=["csv", "parquet"],
 )
 def test_a_run_that_is_killed_and_resumed_is_one_that_was_not(options, then):
-    """Twice killed: after its second checkpoint, and after the next but one."""
+    """It is killed after its second checkpoint, and again two checkpoints later."""
     if "parquet" in options:
         pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
     arguments = ["fig4", "--stop-time", "2", "--no-figures", *options]
@@ -148,7 +148,7 @@ reset = "controller"
 
 @pytest.mark.parametrize("options", [["--loop", "python"], ["--order", "jacobi", "--isolate"]])
 def test_a_run_in_which_things_happen(options):
-    """Killed while some of them last, others wait, and slow components hold what is not due."""
+    """Killed while some events last, others wait, and slow components hold inputs."""
     Path("inputs.csv").write_text(
         "time,plant.tau_w.u,plant.tau_w.v\n" + "".join(f"{t},{t},{-t}\n" for t in range(4))
     )
@@ -166,7 +166,7 @@ def test_a_run_in_which_things_happen(options):
 
 
 def test_a_run_with_a_companion_and_figures(capsys):
-    """Killed in the first, and in the second."""
+    """Killed in the first run, and in its companion."""
     arguments = ["fig5", "--stop-time", "1"]
     assert run(*arguments, out="whole") == 0
     killed_after(2, *arguments, *CHECKPOINTS, out="killed")
@@ -182,7 +182,7 @@ def test_a_run_with_a_companion_and_figures(capsys):
 
 @pytest.mark.slow
 def test_killed_before_any_call_that_changes_the_disk():
-    """Before every fifth one."""
+    """Killed before every fifth call."""
     arguments = ["fig4", "--no-figures", "--stop-time", "0.16", "--checkpoint-every", "0.08"]
     assert run(*arguments, out="whole") == 0
     for n in count(0, 5):

@@ -37,13 +37,13 @@ def quiet(system: System) -> Table:
 def rows_of(instants: Sequence[Instant], setting: Setting, table: Table) -> list[dict[str, float]]:
     """Expected value of every port of the FMU loop in each row of a table."""
     late = [instants[0], *instants[:-1]] if table.header.experiment.acting_row else instants
-    # Actuators with a lag give what they have come to.
+    # Actuators with a lag apply their states.
     T = setting.plant.T
     return [row(now, acting, T) for now, acting in zip(instants, late, strict=True)]
 
 
 def row(now: Instant, acting: Instant, T: tuple[float, ...]) -> dict[str, float]:
-    """The values of the ports where what acts, and what else follows at once, is of an instant."""
+    """Values of all ports, from an instant and from the instant whose commands act."""
     values: dict[str, float] = {}
 
     def group(name: str, members, numbers) -> None:

@@ -1,4 +1,4 @@
-"""Values of every type of FMI, extreme ones too, are the same wherever a column goes."""
+"""Values of every type of FMI, also extreme ones, are the same in runs, files and results."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ RANGES = {
 }  # fmt: skip
 ITEMS = {"calm": 1, "storm": 4}
 
-#: Texts that tables trip over.
+#: Texts that are difficult in tables.
 TEXTS = (
     "", " ", " a ", "a,b", '"', '""', "a\nb", "a\n\nb", "\n", "a\rb", "\r\n", "inf", "1.0", "true",
     "#", "\t", "\x1c", "\ufeff", "\ufffe", "\U0001f30a", "time",
@@ -96,7 +96,7 @@ def write_inputs(path: Path, rows: Sequence[dict[str, Value]]) -> None:
 
 
 def check(result: Result, rows: Sequence[dict[str, Value]]) -> None:
-    """A row has what its time has in the table, and what follows from it at once."""
+    """Compare each row with the table of inputs at its time."""
     for kind in VALUES:
         expected = [rows[min(k, len(rows) - 1)][kind] for k in range(len(rows) + 1)]
         for port in (f"a.u_{kind}", f"a.y_{kind}"):
@@ -163,7 +163,7 @@ def test_a_run_with_infinite_parameters_is_read_and_drawn(fmu: Path, tmp_path: P
         assert result.parameters["a.end_at"] == inf
         assert (result.parameters["a.names[1]"], result.parameters["a.names[2]"]) == ("inf", "1.0")
         assert dict(result.parameters) == dict(made.parameters)
-        # Nothing is drawn of a text.
+        # Texts are not drawn.
         with pytest.raises(ValueError, match="no column matches"):
             result.plot("a.y_String")
     for result in (made, stored):
@@ -196,7 +196,7 @@ def test_a_long_run_is_drawn_whatever_its_types(fmu: Path):
      ("Int8", "1.5x"), ("Float64", "x")],
 )  # fmt: skip
 def test_a_cell_that_its_column_cannot_hold_is_refused_by_name(fmu: Path, tmp_path, kind, text):
-    """By its file, once, and its column; as `--set` would refuse it."""
+    """The message names the file once, and the column, as `--set` would."""
     file = tmp_path / "in.csv"
     file.write_text(f"time,a.u_{kind}\n0,1\n0.1,{text}\n")
     with pytest.raises(InputError) as error:
@@ -240,7 +240,7 @@ WIDE = st.sampled_from(["Int64", "UInt64"]).flatmap(
 @example(("Int64", [2**53 + 1], [-(2**63)], 2**53), {"loop": LOOPS[0]})
 @settings(max_examples=4, deadline=None)
 def test_integers_of_64_bits_are_mapped_exactly(fmu: Path, drawn, how):
-    """The five of these that were wrong in silence: a source or a target that no double holds."""
+    """Sources and targets may be beyond the integers of doubles."""
     kind, sources, targets, other = drawn
     pairs = tuple(zip(sources, targets, strict=False))
     with TemporaryDirectory() as place:

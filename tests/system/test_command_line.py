@@ -196,7 +196,7 @@ def test_command_is_installed(workplace):
     assert shown.stdout.strip()
 
 
-#: Runs the command line and answers which of some modules it has imported.
+#: Runs the command line, and prints which of some modules it has imported.
 _IMPORTED = """
 import sys
 from contextlib import suppress

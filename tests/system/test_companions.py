@@ -112,7 +112,7 @@ COMPARED = [name for name in names() if read_scenario(name).compare]
 
 @pytest.mark.parametrize("name", COMPARED)
 def test_the_ready_scenarios_compare_the_other_controller(name):
-    """In the same surroundings."""
+    """Everything else is the same."""
     request = Request(kind="native")
     ours, theirs = (
         one.system
@@ -133,7 +133,7 @@ def test_the_ready_scenarios_compare_the_other_controller(name):
 
 @pytest.mark.parametrize("name", ["fig5", "fig6"])
 def test_scenarios_of_the_pd_controller_are_the_companions(name):
-    """Figures 5 and 6 have one each, which is promised."""
+    """Figures 5 and 6 have one each."""
     request = Request(kind="native")
     _, companion = with_companion(prepare(*load_scenario(name, "native"), request), request)
     own = prepare(*load_scenario(f"{name}-pd", "native"), request)

@@ -24,7 +24,7 @@ from support.texts import mentions
 
 STEP, STEPS = 0.125, 24
 
-#: A ring by way of a function, written from both ends, with a component of a longer step.
+#: A ring through a function, with connections in both directions, and a longer step.
 OSP = f"""<?xml version="1.0"?>
 <OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">
   <StartTime>0.0</StartTime><BaseStepSize>{STEP}</BaseStepSize><Algorithm>fixedStep</Algorithm>
@@ -59,7 +59,7 @@ OSP = f"""<?xml version="1.0"?>
 </OspSystemStructure>
 """
 
-#: Reads a file of libcosim's and prints all outputs, a line a step.
+#: Runs a file of libcosim's, and prints all outputs after each step.
 LIBCOSIM = """
 import sys
 from libcosimpy.CosimExecution import CosimExecution

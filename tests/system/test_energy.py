@@ -1,4 +1,4 @@
-"""Energy of the vehicle: nothing but actuators, disturbances and moving water may add to it.
+"""Energy of the vehicle: only actuators, disturbances and moving water may add to it.
 
 Its kinetic energy nu_r' M nu_r / 2 belongs to the motion through the water, with the added mass. A
 righting moment G that is the same in pitch and roll has the potential -G cos(theta) cos(phi).

@@ -49,7 +49,7 @@ EVENTS = [
 
 @dataclass
 class Span:
-    """From which instant to which, without the last; at once where nothing ends it."""
+    """Instants from a first one to an end, which is not included."""
 
     begin: int
     end: int = STEPS + 1
@@ -89,7 +89,7 @@ def straight(delayed: bool) -> Iterator[dict[str, Any]]:
             control = output_feedback.initial_state(gains, measured.y)
         control = output_feedback.gated(gains, control, measured.y)
         signals = output_feedback.evaluate(gains, control, measured, H)
-        # In Jacobi order what an event changes at an instant shows in outputs of the next.
+        # In Jacobi order an event changes the outputs of the next instant.
         now = signals.tau, seen.plant.nu_r, setting.disturbance
         commanded, nu_r, waves = before if before and delayed else now
         tau_w = disturbance(waves, nu_r, k * H)
@@ -135,7 +135,7 @@ def test_events_equal_the_straight_line_bit_for_bit(way, order):
 
 
 def test_a_component_with_longer_steps_takes_an_event_at_its_next_one():
-    """From the seventh to the eleventh instant; it takes inputs at even ones."""
+    """The event lasts from the seventh to the eleventh instant; inputs are taken at even ones."""
     plain, biased = (
         simulate("fig4", stop_time=0.4, kind="native", steps={"controller": 0.04}, events=events)
         for events in ([], [{"at": 0.14, "for": 0.08, "bias": {"controller.eta.psi": 0.1}}])
@@ -172,7 +172,7 @@ def test_a_run_is_replayed_from_its_table_bit_for_bit(tmp_path):
 
 
 def test_water_that_moves_is_added_to_the_current(tmp_path):
-    """A table feeds the input: as a current that is as much stronger, bit for bit."""
+    """A table for the input has the effect of a stronger current, bit for bit."""
     file = tmp_path / "water.csv"
     file.write_text("time,plant.water.x,plant.water.z\n0.0,0.25,-0.5\n")
     current = {"plant.current.x": 0.5}
@@ -186,7 +186,7 @@ def test_water_that_moves_is_added_to_the_current(tmp_path):
 
 @pytest.mark.parametrize(("between", "way"), [("hold", WAYS[1]), ("linear", WAYS[0])], ids=str)
 def test_an_override_hides_a_table_of_inputs_until_it_ends(tmp_path, way, between):
-    """The table changes meanwhile; the value of the table at its end is not the one before."""
+    """The table changes during the override."""
     file, scenario = tmp_path / "water.csv", tmp_path / "tide.toml"
     file.write_text("time,plant.water.x\n0.0,0.1\n0.5,0.2\n1.0,0.4\n")
     scenario.write_text(
@@ -218,7 +218,7 @@ def test_water_that_swells_drags_along_a_vehicle_that_nothing_drives(tmp_path):
     values = {"plant.tau.u": 0.0, "plant.integrator": "rk4"}
     table = simulate("fig3a", values, stop_time=10.0, step=0.01, inputs=file, kind="native")
     expected = a * (table.time - T * -np.expm1(-table.time / T))
-    # The water holds still during a step: it is half a step late.
+    # The water is constant during a step, so it is half a step late.
     np.testing.assert_allclose(table["plant.nu.u"], expected, atol=0.51 * 0.01 * a)
 
 

@@ -1,4 +1,4 @@
-"""Values pass along direct feedthrough, a row shows them, and then all components are stepped."""
+"""Feedthrough order: values pass through, a row records them, then all components are stepped."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def test_ways_make_the_same_rows_bit_for_bit(folder, tmp_path):
 
 
 class _Cut:
-    """Kills a run after so many steps, which leaves its last checkpoint."""
+    """A hook that interrupts a run after some steps."""
 
     def __init__(self, steps: int) -> None:
         self._steps = steps
@@ -126,7 +126,7 @@ class _Cut:
 
 @pytest.mark.parametrize("made", [7, STEPS])
 def test_a_run_continues_from_its_checkpoint(folder, tmp_path, made):
-    """Also where a component is within a longer step, and where only the last row is left."""
+    """Also during a longer step of a component, and at the last row."""
     plan = make_plan(steered(folder), Experiment(STEPS * H, H))
     whole, resumed = Table(), Table()
 

@@ -69,7 +69,7 @@ def test_nested_components_are_set_ordered_and_apart(ssp: Path, tmp_path: Path):
 
 
 def test_events_happen_to_nested_components(ssp: Path, tmp_path: Path):
-    """And a table feeds an input."""
+    """Together with a table of inputs."""
     events, table = tmp_path / "events.toml", tmp_path / "water.csv"
     table.write_text("time,auv2.plant.water.y\n0,0\n0.8,-0.05\n")
     events.write_text(

@@ -1,4 +1,4 @@
-"""FMUs as others make them: run with the right numbers, or refused by name."""
+"""FMUs with features of other tools: run with the right numbers, or refused by name."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_files_keep_texts_and_numbers(workplace, form):
 
 @EVERY_WAY
 def test_texts_that_change_in_every_step_arrive(tmp_path, way):
-    """Each of two FMUs says the number of its steps, and hears the other's of the step before.
+    """Each of two FMUs outputs its number of steps and its input, which is the other's last output.
 
     At first each holds the start value of its description.
     """
@@ -113,7 +113,7 @@ def test_an_alarming_message_of_a_call_that_went_well_ends_nothing(tmp_path, way
 
 @pytest.mark.parametrize("way", [way for name, way in WAYS.items() if name != "compiled"])
 def test_a_second_instance_of_an_fmu_that_allows_one_gets_its_own_process(tmp_path, way):
-    """Also in the next run of this process: the FMU never takes a second one."""
+    """Also in the next run of this process."""
     fmu = build(
         tmp_path,
         "ONCE",
@@ -128,7 +128,7 @@ def test_a_second_instance_of_an_fmu_that_allows_one_gets_its_own_process(tmp_pa
 
 @HERE
 def test_nothing_is_left_in_a_library_of_the_run_before(tmp_path, way):
-    """The gain of an instance is one, and one more for each that its library has had before."""
+    """Each instance of a library has a larger gain than the one before."""
     system = with_values(system_of(build(tmp_path, "REMEMBERS")), {"u": 2.0})
     for _ in range(3):
         assert (run(system, **way)["a.y"] == 2.0).all()
@@ -136,7 +136,7 @@ def test_nothing_is_left_in_a_library_of_the_run_before(tmp_path, way):
 
 @HERE
 def test_a_last_step_that_rounding_takes_beyond_the_stop_time_is_made(tmp_path, way):
-    """0.2 and 0.1 are more than 0.3, and the FMU makes no step beyond a stop time that it knows."""
+    """In doubles 0.2 + 0.1 > 0.3, and the FMU makes no step beyond its stop time."""
     table = run(system_of(build(tmp_path)), 0.3, 0.1, **way)
     assert table.failure is None
     assert table.time[-1] == 3 * 0.1
@@ -294,7 +294,7 @@ def test_numbers_of_descriptions_that_others_do_not_read_are_refused(
 
 
 def test_annotations_of_tools_are_not_read_as_numbers(tmp_path):
-    """Nor do they matter where the description is wrong in another place."""
+    """Also if the description is invalid elsewhere."""
     tool = '<Annotations><Tool name="t"><Item value="1_0" min="low"/></Tool></Annotations>'
     change = '<Real start="1"/>', f'<Real start="1" odd="1"/>{tool}'
     assert read_component("a", build(tmp_path, change=change)).variables["gain"].start == "1"
@@ -330,7 +330,7 @@ def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variabil
     theirs = fmpy.simulate_fmu(
         str(fmu), stop_time=1.0, output_interval=0.1, input=inputs, output=["y"], validate=False
     )
-    # Its last step may be one of a rounding error.
+    # Its last step may be as short as a rounding error.
     np.testing.assert_allclose(table["a.y"][1:], theirs["y"][1 : len(table)], atol=1e-12)
     assert set(table["a.y"]) <= {0.0, 1.0, 3.0} or variability == "continuous"
 
@@ -343,7 +343,7 @@ _FEEDTHROUGH = ('<Unknown index="2" dependencies=""/>', '<Unknown index="2" depe
 def ring(folder, ends, steps=()):
     """Three FMUs in a ring, in which the outputs of the first two feed through.
 
-    Each adds (1 + u) h to what it gives, which is that and u, but for the last.
+    Each integrates 1 + u; the outputs of the first two are the integral plus u / 2.
     """
     components = {}
     for name, end in zip("abc", ends, strict=True):

@@ -83,7 +83,7 @@ def test_followers_lose_their_leader_as_the_remark_says():
 
 
 def test_the_first_place_has_the_errors_of_a_single_vehicle():
-    """It is the leader's own, and the same run: so are indices that compare at one instant."""
+    """The first place is the leader's, so rows and final errors are equal."""
     path = {
         str(name).replace("leader.", "planner."): value
         for name, value in read_scenario("formation-v").parameters.items()

@@ -113,7 +113,7 @@ def chain(folder: Path, names: Sequence[str]) -> System:
 def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
     tmp_path: Path, host: str, place: int
 ):
-    """None where a tool follows feedthrough, one step for each where it exchanges all at once.
+    """None if a tool follows feedthrough, one step for each if it exchanges all values at once.
 
     fmuloader is left out: it wants functions for model exchange, and has the loop of fmpy.
     """
@@ -131,7 +131,7 @@ def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
 
 @pytest.mark.parametrize("host", ["ecos", "fmpy-ssp", *slow("libcosim-ssp", "libcosim-osp")])
 def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: str):
-    """Some are given a flat archive: what they read of a nested one is not all of it."""
+    """Some get a flat archive, since they do not read nested ones completely."""
     system = fleet(dist)
     if host not in WITHOUT_PARAMETERS:
         system = system.with_parameters({PortName("auv2.plant", "eta0.y"): 2.0})
@@ -143,7 +143,7 @@ def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: s
 @pytest.mark.parametrize("host", ["libcosim-ssp", "ecos"])
 def test_formations_and_seas_have_our_numbers_in_other_hosts(native: Path, host: str, scenario):
     system = closed_loop(native, read_scenario(scenario))
-    # They leave the other shape as it is in the FMU.
+    # These hosts set no enumerations.
     own = {
         name: system.component(name.component).start(name.port)
         for name in system.changed("Enumeration")

@@ -1,4 +1,4 @@
-"""FMUs that are not ours and misbehave, in processes of their own and in the master's."""
+"""Misbehaving FMUs, in processes of their own and in the master's."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def raising(tmp_path_factory: pytest.TempPathFactory) -> System:
 
 @pytest.fixture
 def mark(monkeypatch: pytest.MonkeyPatch) -> str:
-    """Something by which processes that a test has started are found again."""
+    """An environment variable that marks the processes of a test."""
     mark = f"FOREIGN_TEST={uuid4()}"
     monkeypatch.setenv(*mark.split("="))
     return mark
@@ -177,7 +177,7 @@ def test_a_value_that_is_not_finite_is_named_with_its_time(c_fmu, act, value, is
 
 @pytest.mark.slow
 def test_output_is_shown_and_messages_are_bounded(c_fmu, capfd):
-    """And none of it speaks to the terminal."""
+    """Control characters are escaped."""
     assert run_isolated(foreign_system(c_fmu, "WRITES", at=0.46)).failure is None
     shown = capfd.readouterr().err
     assert shown == 2 * 100_000 * "to be or not to be, that is the question\n"
@@ -268,7 +268,7 @@ def rows_of(out: Path | str, form: str = "csv") -> np.ndarray:
 def test_command_line_says_what_happened_and_keeps_the_rows(
     archives, tmp_path, name, options, last_time, words
 ):
-    """Also where nothing more is called after fmi2Fatal: the FMU in C aborts then."""
+    """After fmi2Fatal nothing is called: the FMU in C would abort."""
     temporary = tmp_path / "temporary"
     process = run(archives, name, *options, out=tmp_path / "out", folder=temporary)
     *_, last = process.communicate()[1].splitlines()
@@ -369,7 +369,7 @@ def test_a_current_folder_that_is_gone_is_not_needed(dist, tmp_path, how):
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
 def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, mark, number):
-    """Also not by KILL, which the process itself cannot answer."""
+    """Also after KILL, which the process cannot handle."""
     out, temporary = tmp_path / "out", tmp_path / "temporary"
     process = run(archives, "HANGS", "--isolate", out=out, folder=temporary)
     assert process.stderr is not None
@@ -385,7 +385,7 @@ def test_nothing_is_left_of_a_run_that_hangs_and_is_ended(archives, tmp_path, ma
 
 
 def test_an_fmu_that_ended_fatally_is_loaded_again(archives: Path):
-    """The C library remembers, as any may, that it must not be called."""
+    """The C library remembers its failure in a static variable."""
     [archive] = (archives / "FATAL").iterdir()
     code = (
         "from orchestrator import simulate\n"

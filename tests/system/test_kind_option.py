@@ -1,4 +1,4 @@
-"""`--kind`, `--fmi` and `--platforms`: the FMUs in C wherever a user meets those in Python."""
+"""`--kind`, `--fmi` and `--platforms`: FMUs in C in all commands."""
 
 from __future__ import annotations
 

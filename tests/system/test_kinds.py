@@ -1,4 +1,4 @@
-"""Both kinds of FMUs are one: the same rows to the bit, the same refusals at the same time."""
+"""Both kinds of FMUs have the same rows, bit for bit, and the same refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`auv-fmu live`: the page's rows in Node and in a browser, beside the ones of the native FMUs."""
+"""`auv-fmu live`: the page's rows in Node and in a browser, compared with the native FMUs."""
 
 from __future__ import annotations
 
@@ -40,15 +40,14 @@ SCRIPTS = Path(__file__).parents[2] / "orchestrator" / "live" / "web" / "test"
 
 pytestmark = [needs_npm, needs_zig]
 
-#: Until when [s] that is so where a run is chaotic: 100 m away, the robust term of the PD
-#: controller switches at every step.
+#: Last compared time [s] of a chaotic run: 100 m away, the robust term of the PD controller
+#: switches in every step.
 CHAOTIC = {"fig6-pd": 10.0}
 
-#: Tolerances where a run makes differences larger: two vehicles come back to their leader at once,
-#: with commands beyond their limits.
+#: Larger tolerances: two vehicles come back to their leader with commands beyond their limits.
 LARGER = {"formation-lost-link": 1e-5}
 
-#: Sine and its like, which differ between C libraries in the last bit.
+#: Sine and similar functions, which differ between C libraries in the last bit.
 SAME_FUNCTIONS = Path(__file__).parents[1] / "support" / "same_functions.h"
 
 #: Scenarios with each kind of component and loop; `-m slow` runs the others.
@@ -141,7 +140,7 @@ def compiled(run: Prepared) -> Prepared:
     return replace(run, stepping=choose_loop("compiled", run.plan.experiment))
 
 
-#: Indices that sines and the like go into.
+#: Indices that depend on such functions.
 OF_SINES = ("final_error",)
 
 
@@ -179,7 +178,7 @@ def places(table: Table) -> list[int]:
 @pytest.mark.slow
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 def test_only_the_c_library_makes_rows_differ(parts: Parts, tmp_path, monkeypatch):
-    """With the same sine and its like in both, all rows and indices are the same bit for bit."""
+    """With the same functions in both, all rows and indices are equal bit for bit."""
     with monkeypatch.context() as patch:
         patch.setattr(module, "_FLAGS", (*module._FLAGS, "-include", str(SAME_FUNCTIONS)))
         content = module.compiled(presets.bundled().sources)[module.MODULE]
@@ -203,7 +202,7 @@ def test_only_the_c_library_makes_rows_differ(parts: Parts, tmp_path, monkeypatc
             assert outcome[f"{name}.{i}"].get("failure") == ending.failure
             compare_indices(run, table, found, outcome[f"{name}.{i}"], ())
     compiled_reducers.library_of.cache_clear()
-    # They are not the rows of any C library.
+    # Another C library gives other rows.
     assert (tmp_path / "fig4.0").read_bytes() != other_rows
 
 

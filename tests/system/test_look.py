@@ -35,7 +35,7 @@ def test_plot_draws_results_over_each_other(results, tmp_path, monkeypatch, caps
 
 
 def test_record_that_does_not_name_a_table_is_not_its_record(results, tmp_path):
-    """Another table beside the record: nothing is known of its parameters."""
+    """Parameters of another table next to the record are unknown."""
     for name in ("result.csv", "other.csv"):
         (tmp_path / name).write_bytes((results / "quiet" / "result.csv").read_bytes())
     (tmp_path / "run.json").write_bytes((results / "quiet" / "run.json").read_bytes())

@@ -1,4 +1,4 @@
-"""The compiled loop does what the Python loop does, bit for bit and word for word."""
+"""The compiled loop has the rows and messages of the Python loop."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from support.texts import mentions
 #: Step [s].
 H = 0.5
 
-#: Orders that any system can be run in; None: the first, or the second where its FMUs want that.
+#: Orders for any system; None: feedthrough, or Gauss-Seidel if its FMUs need that.
 ANY = (None, "gauss-seidel", "jacobi")
 
 ISOLATED = pytest.param({"loop": "python", "isolation": Isolation(20.0)}, marks=pytest.mark.slow)
@@ -108,7 +108,7 @@ def test_the_bundle_gives_the_same_rows(dist: Path, order: str):
     assert len(same(closed_loop(dist), Experiment(5.0, 0.03, order))) > 160
 
 
-#: A component that feeds another one, by which it is fed.
+#: Two components that feed each other.
 PAIR = {
     "shapes": {name: Shape((1, 0, 0, 1), (1, 1, 0, 1)) for name in ("bad", "good")},
     "connections": {
@@ -196,7 +196,7 @@ def test_an_input_that_its_type_cannot_hold_ends_the_run(
 @pytest.mark.parametrize("order", Experiment.ORDERS)
 @pytest.mark.parametrize("act", ["ROUNDS", "FLUSHES"])
 def test_the_mode_of_an_fmu_changes_no_number_of_the_others(folder, loop, order, act):
-    """It takes it on when its outputs are asked for, which it only copies."""
+    """The FMU changes the floating-point mode in the call that gets its outputs."""
     there = replace(pair(folder, act, "GET"), connections=())
     wires = [
         replace(connection, transformation=Linear(0.1, 1e-3))
@@ -213,7 +213,7 @@ def test_the_mode_of_an_fmu_changes_no_number_of_the_others(folder, loop, order,
 
 @pytest.mark.parametrize("loop", LOOPS)
 def test_an_interrupt_ends_a_run_of_slow_steps_soon(folder, loop):
-    """It comes in the seventh step; each takes longer than a look may be away."""
+    """The signal comes in the seventh step."""
     system = pair(folder, "INTERRUPT", milliseconds=40)
     table = run(system, Experiment(100.0, H), loop)
     assert 8 <= len(table) <= 9

@@ -1,4 +1,4 @@
-"""A study whose processes are killed comes to the table of one that was left in peace."""
+"""A study whose processes are killed has the same table as an undisturbed one."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def rows(out):
     """Number of kept runs, from a copy: the process that keeps them locks the file."""
     with TemporaryDirectory() as copy:
         for file in out.glob(f"{DATABASE}*"):
-            # It may be gone meanwhile.
+            # It may have been removed.
             with suppress(FileNotFoundError):
                 shutil.copy(file, copy)
         with closing(sqlite3.connect(Path(copy, DATABASE))) as database:
@@ -62,7 +62,7 @@ def rows(out):
 
 
 def in_the_middle(process, out):
-    """When some more runs are kept than before, and some are under way; how many."""
+    """Wait until some more runs are kept, and return their number."""
     before = rows(out)
     while (kept := rows(out)) <= before + 2:
         assert process.poll() is None, process.communicate()

@@ -92,7 +92,7 @@ def test_full_disk_at_any_stage(workplace, capsys, size):
         assert len(lines) == 1
         assert "No space left on device" in lines[0]
         if status == 2:
-            # Not even what is taken before the first row.
+            # There was no room even before the first row.
             assert contents(disk) == {}
             return
         assert status == 1
@@ -172,7 +172,7 @@ def test_folders_that_may_not_be_written(workplace):
             assert "Permission denied" in line
             assert "; choose " in line
         assert contents(sealed) == before
-        # To look at it needs no more than to read it.
+        # `plot` without a file only reads.
         status, lines = called("plot", "sealed/r", before=without_privileges)
         assert (status, lines) == (0, [])
     finally:
@@ -306,7 +306,7 @@ def busy(process: subprocess.Popen[str], temporary: Path) -> bool:
     ("command", "number"), [("build", signal.SIGKILL), ("report", signal.SIGHUP)]
 )
 def test_children_end_with_their_parent(workplace, temporary, command, number):
-    """And what was good stays good, byte for byte; nothing stays but what the next one removes."""
+    """Earlier files stay as they were; the next command removes temporary files."""
     out = workplace / "out"
     out.mkdir()
     for name in ("mine.ssp", "mine.html", "mine.json"):

@@ -1,4 +1,4 @@
-"""The master itself: checks before a run, order, time, and what is left after a failure."""
+"""The master: checks before a run, order, times, and rows after a failure."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ def test_a_ring_that_feeds_another_is_opened_first(folder):
 
 
 def test_strict_wants_rings_solved_unless_something_else_is_stated(folder):
-    """An output that takes a step of its own cannot be solved for."""
+    """A ring through a component with longer steps cannot be solved."""
     system = replace(ring(folder, steps={"a": 2 * H}), stop_time=1.0)
     with pytest.raises(InputError, match=r"a .*c\.g .*; a "):
         simulated(system, strict=True, step=H)

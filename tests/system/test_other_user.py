@@ -92,7 +92,7 @@ def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.M
         for folder in (forged / "auv-fmu").iterdir():
             shutil.copytree(folder, open_folder / "auv-fmu" / folder.name)
 
-    # As it was made with umask 0, or by the other user.
+    # The folder was made with umask 0, or by the other user.
     (open_folder / "auv-fmu").mkdir()
     (open_folder / "auv-fmu").chmod(0o777)
     assert done_by(other, plant)
@@ -150,7 +150,7 @@ def test_a_ledger_of_another_user_is_ignored(open_folder, other):
     assert not is_changed(file)
     with pytest.raises(Taken, match="damaged or not from auv-fmu"):
         Ledger(open_folder)
-    # A whole folder of another user's is read as it is meant.
+    # A folder that belongs to the other user is read as it is.
     for path in (open_folder, file.parent, file):
         os.chown(path, other, other)
     assert locate(file).read_text() == "forged"

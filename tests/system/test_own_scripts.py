@@ -1,4 +1,4 @@
-"""FMUs of the user's own scripts: what goes into them, and that no old one is run in silence."""
+"""FMUs of the user's own scripts: their contents, and warnings if they are older than the script."""
 
 from __future__ import annotations
 
@@ -188,7 +188,7 @@ def in_python(action: Callable[[], object]) -> str:
 
 
 def test_an_fmu_older_than_its_script_is_never_run_in_silence(own: Path, capsys):
-    """Each change with each command, and a way to say that it is meant to be old."""
+    """Each change with each command; a copy under another name may be old."""
     before = {path: path.read_bytes() for path in own.rglob("*.*") if path.is_file()}
     Path("own.toml").write_text(SCENARIO)
     for doing, (action, culprit) in CHANGES.items():

@@ -43,7 +43,7 @@ EXPECTED = {
     },
 }
 
-#: Half a unit of the last digit that is said.
+#: Half a unit of the last stated digit.
 _ROUNDING = {"[m]": 0.0051, "[N]": 0.51, "[%]": 0.051}
 
 
@@ -56,7 +56,7 @@ RUNS = [
 
 @pytest.mark.parametrize(("scenario", "pd", "n"), RUNS)
 def test_runs_with_other_seeds_are_within_the_bands_that_are_said(scenario, pd, n):
-    """All bands to their last digit; of a few runs, each no farther out than the band is wide."""
+    """All bands to their last digit; a few runs lie within three times the band."""
     found = over_seeds(scenario, pd, n)
     for name, (middle, low, high) in EXPECTED[scenario, pd].items():
         others = found[name][1:]

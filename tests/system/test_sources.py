@@ -31,7 +31,7 @@ BUILD = """<fmiBuildDescription fmiVersion="3.0">
 <IncludeDirectory name="headers"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>
 """
 
-#: Sources as FMUs have them: all of a folder, those that a list names, or a list of FMI 3.0's kind.
+#: Sources in FMUs: all files of a folder, files in a list, or a build description of FMI 3.0.
 WAYS = {
     "all": (TOGETHER, ""),
     "named": (
@@ -85,7 +85,7 @@ VALUES = {"u": 0.3, "v": 0.1, "a": 1.1}
 
 
 def forget() -> None:
-    """Forget what was unpacked, as another process has."""
+    """Forget unpacked FMUs, like another process."""
     user_files._folders.clear()
     user_files._digests.clear()
 
@@ -105,7 +105,7 @@ def test_sources_give_the_numbers_of_the_library(tmp_path: Path, way: str):
     assert {path.name for path in tmp_path.iterdir()} == {"s.fmu", relay(tmp_path).name}
 
 
-#: As 20-sim writes them: functions have a prefix unless it is defined, and a header lies deeper.
+#: As written by 20-sim: functions have a prefix unless it is defined, and a header is in a folder.
 PREFIXED = """#ifndef FMI2_FUNCTION_PREFIX
 #define FMI2_FUNCTION_PREFIX relay_
 #endif

@@ -75,7 +75,7 @@ def test_nested_system_computes_what_it_says(ssp: Path, order: str, loop: str):
     assert np.array_equal(result["inner.b.y"], ramp)
     gained, taken = result["inner.c.g"], result["d.u"]
     assert np.array_equal(gained[1:], 10.0 * ramp[:-1])
-    # Side by side, what follows at once from an input is passed on a step later.
+    # In Jacobi order outputs with feedthrough are passed on a step later.
     late = order == "jacobi"
     assert np.array_equal(taken[1 + late :], -gained[1 : len(gained) - late])
 

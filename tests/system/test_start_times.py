@@ -63,7 +63,7 @@ TIMES = {"a.t", "b.t"}
 
 @pytest.fixture(scope="module")
 def systems(native: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, System]:
-    """Autonomous systems: of the vehicle's, the disturbance that swings is turned off."""
+    """Autonomous systems: the vehicle's oscillating disturbance is turned off."""
     folder = tmp_path_factory.mktemp("fmus")
     of_relays = {"a": relay.relay(folder), "b": relay.relay(folder)}
     types = {f"b.u_{kind}": f"a.y_{kind}" for kind in typed.SCALARS}
@@ -243,7 +243,7 @@ def test_files_of_a_run_differ_only_in_their_times(folders, name, start):
 
 @each_system
 def test_commands_take_the_system_and_the_result(folders, name, start, capsys, tmp_path):
-    """`check`, `verify`, `export`, `plot`, and `run` on in another format from a checkpoint."""
+    """`check`, `verify`, `export`, `plot`, and `run` with checkpoints."""
     output, *_ = SIGNALS[name]
     outputs = []
     for one in (start, 0.0):

@@ -1,4 +1,4 @@
-"""Standard streams that are closed, full or without a reader, and Ctrl-C before anything began."""
+"""Standard streams that are closed, full or without a reader, and an early Ctrl-C."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def test_complaint_that_cannot_be_written_leaves_the_status(tmp_path: Path):
 @pytest.mark.slow
 @pytest.mark.parametrize("streams", ["> /dev/full", ">&- 2>&- <&-"])
 def test_run_keeps_its_files_whatever_the_streams(tmp_path: Path, streams: str):
-    """A closed stream's number went to the next file that was opened, and got what was printed."""
+    """The next opened file must not get a closed stream's number, and with it the output."""
     shell(f"$A {' '.join(RUN)}", tmp_path)
     whole = (tmp_path / "o/result.csv").read_bytes()
     shell(f"rm -r o; $A {' '.join(RUN)} {streams}", tmp_path)

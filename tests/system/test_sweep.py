@@ -60,7 +60,7 @@ def files(folder: Path) -> dict[str, int]:
     ],
 )
 def test_option_that_makes_many_runs_sooner_is_named(scenario, kind, n, option, monkeypatch):
-    """Events are what the batch engine does not know."""
+    """The batch engine does not support events."""
     monkeypatch.setattr("orchestrator.studies.sweep.machines_compiler", lambda: "cc")
     runs = {"scenario": scenario, "vary": {"plant.eta0.y": {"from": 0, "to": 1, "n": n}}}
     space = Space(study_of("many", runs), {scenario: load_scenario(scenario, kind)})
@@ -194,7 +194,7 @@ def test_another_scenario_of_the_same_name_is_another_study(workplace, capfd, en
 
 
 def test_runs_have_the_steps_that_a_system_is_given_where_it_names_none(tmp_path):
-    """Those that its FMUs were made for, as a run by itself has them."""
+    """The default steps of its FMUs, as in a single run."""
     named = ('guid="others">', 'guid="others"><DefaultExperiment stepSize="{}"/>')
     fmus = []
     for name, step in (("a", "0.1"), ("b", "0.2")):

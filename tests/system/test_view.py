@@ -1,4 +1,4 @@
-"""The page of `auv-fmu view` holds the runs, nothing but the runs, and shows them in a browser."""
+"""The page of `auv-fmu view` contains only the runs, and shows them in a browser."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def test_a_page_of_many_vehicles_is_light():
 
 @pytest.mark.parametrize("ended", [100, 400])
 def test_compared_runs_have_the_same_times(ended):
-    """The rows of one whose rows are not the other's, until it ends."""
+    """Also if one has fewer rows and ends earlier."""
     table = loop_table()
     other = Table.of(table.header, table.rows[:ended:2])
     data, [one, two] = stored(page_of(Drawn("one", table), Drawn("two", other)))
@@ -214,7 +214,7 @@ def chromium(tmp_path_factory: pytest.TempPathFactory):
 
 
 def opened(chromium: Browser, page: Path) -> Browser:
-    """A page that has drawn its runs; nothing was said on the console."""
+    """Open a page, and wait until it has drawn its runs."""
     chromium.open(page)
     end = time.monotonic() + 60.0
     while not chromium.evaluate("document.body.classList.contains('started')"):
