@@ -224,7 +224,7 @@ def test_an_interrupt_ends_a_run_of_slow_steps_soon(folder, loop):
 
 @pytest.mark.parametrize("loop", LOOPS)
 def test_observers_of_slow_steps_are_told_meanwhile(folder, loop):
-    """Steps of 40 ms: at least every eighth. Their warnings are no failures."""
+    """Steps of 40 ms: at least every eighth. Warnings do not end the run."""
     counts = []
 
     class Counts(Table):

@@ -1,4 +1,4 @@
-"""FMUs of the user's own scripts: their contents, and warnings if they are older than the script."""
+"""FMUs of the user's own scripts: their contents, and warnings if they are out of date."""
 
 from __future__ import annotations
 
