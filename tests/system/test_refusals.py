@@ -96,11 +96,11 @@ def test_bad_file_is_refused_in_one_line(workplace: Path, refused: Callable[...,
     if kind == "without permission" and os.geteuid() == 0:
         pytest.skip("root may read everything")
     # Commands read files by the same functions: each meets some kinds.
-    commands = [*COMMANDS.values()][KINDS.index(kind) % 3 :: 3]
+    commands, names = [*COMMANDS.values()][KINDS.index(kind) % 3 :: 3], {}
     for arguments, ending in ((words, ending) for words, endings in commands for ending in endings):
         if ending == "parquet":
             pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
-        name = bad_file(kind, ending)
+        name = names[ending] = names.get(ending) or bad_file(kind, ending)
         shown = name if kind != "zero in name" else r"a\x00b"
         assert shown in refused(*(name if word == "?" else word for word in arguments))
 
