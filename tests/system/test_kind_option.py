@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import zipfile
-from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,9 +15,7 @@ from fmpy.validation import validate_fmu
 from fmus.kinds import KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from support.machine import contents
 from support.settings import NAMES
-from support.texts import mentions
 
 SECOND = ["--stop-time", "1"]
 
@@ -33,20 +29,6 @@ def kinds(folder: Path) -> dict[str, str]:
     """The kind of each component of a run."""
     record = json.loads((folder / "run.json").read_text())
     return {name: fmu["kind"] for name, fmu in record["fmus"].items()}
-
-
-@pytest.mark.slow
-def test_build_writes_fmus_ssp_and_checksums(workplace, capsys):
-    assert main(["build", "--kind", "native"]) == 0
-    folder = workplace / "fmus/dist/native"
-    others = {"auv.ssp", "SHA256SUMS", "build.json"}
-    assert contents(folder).keys() == others | {f"{name}.fmu" for name in NAMES}
-    assert mentions(capsys.readouterr().out, "FMI 2.0 linux64")
-    for line in (folder / "SHA256SUMS").read_text().splitlines():
-        digest, name = line.split("  ")
-        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
-    assert main(["build", "--kind", "native"]) == 0
-    assert "is up to date" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -125,18 +107,3 @@ def test_unknown_kind_is_a_value_error(run):
 def test_system_keeps_the_fmus_it_was_loaded_with():
     with pytest.raises(ValueError, match="FMUs"):
         simulate(load("fig4"), kind="native")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
-def test_one_archive_has_libraries_for_several_machines(native: Path, workplace: Path):
-    options = ["--kind", "native", "--platforms", "linux64,darwin64", "--out", "all"]
-    assert main(["build", *options]) == 0
-    for name in NAMES:
-        path = workplace / "all" / f"{name}.fmu"
-        assert validate_fmu(str(path)) == []
-        with zipfile.ZipFile(path) as archive, zipfile.ZipFile(native / path.name) as own:
-            libraries = {entry for entry in archive.namelist() if "binaries/" in entry}
-            same = set(own.namelist()) - {f"binaries/linux64/{name}.so"}
-            assert {e: archive.read(e) for e in same} == {e: own.read(e) for e in same}
-        assert libraries == {f"binaries/linux64/{name}.so", f"binaries/darwin64/{name}.dylib"}
