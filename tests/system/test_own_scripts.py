@@ -99,9 +99,10 @@ def test_a_script_runs_with_the_packages_of_researchers(workplace: Path):
     }  # fmt: skip
 
 
-def test_a_script_runs_with_its_modules_and_data_files(own: Path):
-    assert main(["build", "own.py", "--out", "again"]) == 0
-    assert Path("again/Own.fmu").read_bytes() == Path("Own.fmu").read_bytes()
+def test_a_script_runs_with_its_modules_and_data_files(own: Path, tmp_path_factory):
+    other = tmp_path_factory.mktemp("other")
+    assert main(["build", "own.py", "--out", str(other)]) == 0
+    assert (other / "Own.fmu").read_bytes() == Path("Own.fmu").read_bytes()
     with zipfile.ZipFile("Own.fmu") as archive:
         names = {re.sub(r"_[0-9a-f]{12}", "", name) for name in archive.namelist()}
     assert {name.removeprefix("resources/") for name in names} >= {*FILES} - {"data/unused.txt"}
