@@ -23,10 +23,10 @@ from orchestrator.machine.disk import hold_lock
 from orchestrator.runs import bundle
 from ready_wheel import write_fmus
 
-# A slow machine is no error, and the same tree gives the same result every time.
+# Slow machines pass, and the same tree gives the same result every time.
 settings.register_profile("patient", deadline=None, derandomize=True, max_examples=40)
 settings.load_profile("patient")
-# The same and more of them, beside the slow tests.
+# More of the same examples, together with the slow tests.
 settings.register_profile("thorough", settings.get_profile("patient"), max_examples=200)
 # New examples every time, and many.
 settings.register_profile("search", deadline=None, max_examples=2000)
@@ -40,21 +40,21 @@ settings.register_profile(
 # For tests/fuzz/test_keeping.py: thousands of folders, and of files with a changed bit.
 settings.register_profile("attack", settings.get_profile("search"), max_examples=7150)
 
-# Where a shell has started the tests in the background, or nohup has, they ignore signals, and so
-# does all that they start.
+# Tests that a shell or nohup has started in the background ignore signals, and so do their
+# children.
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if os.name == "posix":
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
-#: What a reason says beside the name of what is missing.
+#: Words of a reason around the name of the missing thing.
 _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")
 
-#: Where pytest's cache keeps what was skipped.
+#: Key of the skipped tests in pytest's cache.
 _SKIPPED = "auv-fmu/skipped"
 
 
 def pytest_runtest_setup(item: pytest.Item) -> None:
-    """Note what a test would be skipped without."""
+    """Note the requirements of a test."""
     for mark in item.iter_markers("skipif"):
         needed, found = _MISSING.subn("", mark.kwargs["reason"])
         item.user_properties += [("needs", needed)] * found
@@ -62,7 +62,7 @@ def pytest_runtest_setup(item: pytest.Item) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """Mark what the last run has skipped, for `-m skipped`."""
+    """Mark tests that the last run skipped, for `-m skipped`."""
     if cache := getattr(config, "cache", None):
         skipped = {*cache.get(_SKIPPED, [])}
         for item in items:
@@ -71,7 +71,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
-    """Say what not every machine has, and how many tests ran with it or were skipped, and why."""
+    """Report requirements of the tests that ran, and reasons for the skipped ones."""
     passed, skipped = (terminalreporter.stats.get(name, []) for name in ("passed", "skipped"))
     if cache := getattr(terminalreporter.config, "cache", None):
         nodes = sorted({report.nodeid for report in skipped})
@@ -96,21 +96,21 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session", autouse=True)
 def _own_cache(shared: Path) -> None:
     """Keep FMUs that the tests build out of the user's cache; runs may share another one."""
-    # What that compiler has made of the C libraries takes minutes to make again.
+    # Compiled C libraries of that compiler take minutes to make again.
     os.environ.setdefault("ZIG_GLOBAL_CACHE_DIR", str(user_cache_path("zig", appauthor=False)))
     os.environ["XDG_CACHE_HOME"] = os.environ.get("TESTS_CACHE") or str(shared / "cache")
 
 
 @pytest.fixture(autouse=True)
 def _same_imports() -> Iterator[None]:
-    """Forget the folders that a test imported from: a later one may want a name that is free."""
+    """Restore `sys.path`: later tests may import modules of the same names."""
     before = [*sys.path], [*sys.path_hooks]
     yield
     sys.path[:], sys.path_hooks[:] = before
 
 
 def _copy(fmus: Path, module: str, folder: Path, *options: str, **_: object) -> None:
-    """Take the place of what would build them once more."""
+    """Copy FMUs instead of building them again."""
     shutil.copytree(fmus, folder, dirs_exist_ok=True)
 
 
@@ -165,14 +165,14 @@ def ready(shared: Path) -> Path:
 
 
 def _copy_ready(ready: Path, module: str, folder: Path, *options: str, **_: object) -> None:
-    """Take the place of what would build FMUs for all platforms once more."""
+    """Copy FMUs for all platforms instead of building them again."""
     kind, fmi = (options[options.index(name) + 1] for name in ("--kind", "--fmi"))
     _copy(ready / bundle.CATEGORY / bundle.key_of(kind, fmi), module, folder)
 
 
 @pytest.fixture(scope="session")
 def release(shared: Path, ready: Path) -> dict[str, Path]:
-    """What the archives of a release unpack to, by versions of FMI; to be read only."""
+    """Folders from the archives of a release, by versions of FMI; to be read only."""
     folder = shared / "release"
     folder.mkdir(exist_ok=True)
     with hold_lock(folder, wait=True), pytest.MonkeyPatch.context() as patch:
@@ -192,7 +192,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., str]:
-    """What `auv-fmu` says of arguments that it refuses: a line that can be read, and no file."""
+    """A function that returns the one line with which `auv-fmu` refuses arguments."""
 
     def said(*arguments: str, status: int = 2) -> str:
         capsys.readouterr()

@@ -306,9 +306,9 @@ def library_findings(text: str) -> Iterator[tuple[int, int, str]]:
     for result in LintFile("text", f"{text}\n").lint({**DEFAULT, "checks": selected}):
         # LintFile inserts a line at the beginning.
         begin, end = (place - 1 for place in result.check_result.span)
-        # False findings: "for ever" in "for every", and repeated numbers and symbols.
-        is_word = not text[end - 1 : end + 1].isalpha()
-        if is_word and not re.fullmatch(r"(?:\w|[\d.]+)\s+(?:\w|[\d.]+)", text[begin:end]):
+        # False findings: "for ever" in "for every", repeated numbers and symbols, a type of C.
+        is_cut = text[end - 1 : end + 1].isalpha()
+        if not is_cut and not re.fullmatch(r"(\w|[\d.]+)\s+(\w|[\d.]+)|long long", text[begin:end]):
             yield begin, end, result.check_result.message
 
 

@@ -46,7 +46,7 @@ LINE_WIDTH = 98
 INDENT = "    "
 
 #: Type of counters that may pass the largest int.
-_WIDE = " ".join(("long", "long"))
+_WIDE = "long long"
 
 #: Precedence of the operators of C.
 _TERNARY, _OR, _AND, _EQUALITY, _RELATION, _SUM, _PRODUCT, _UNARY, _POSTFIX = range(9)

@@ -63,7 +63,7 @@ def test_equations_are_where_the_table_says(row):
 
 
 def mentions(text: str, number: int) -> bool:
-    """Whether a text names an equation, alone or within a range such as "(4) to (8)"."""
+    """True if a text names an equation, also within a range such as "(4) to (8)"."""
     if f"({number})" in text:
         return True
     ranges = re.findall(r"\((\d+)\) to \((\d+)\)", text)

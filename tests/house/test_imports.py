@@ -1,4 +1,4 @@
-"""The laws of the house: imports run one way, and the general half knows no vehicle."""
+"""The laws of the house: imports run one way, and the general half names no vehicle."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FLOORS = {
     ),
 }  # fmt: skip
 
-#: What a package may import besides itself and the standard library.
+#: Packages that each package may import besides itself and the standard library.
 ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "orchestrator", "pythonfmu"},
@@ -43,13 +43,13 @@ ALLOWED = {
     },
 }  # fmt: skip
 
-#: Runs in environments of other tools, and imports nothing of this package.
+#: Modules that run in environments of other tools, and import no package of the project.
 FOREIGN = ("exchange", "drivers")
 
-#: What else may be imported of `fmus`: how FMUs run, and PythonFMU, stays out of the process.
+#: Modules of `fmus` that the orchestrator may import; others would load PythonFMU.
 DECLARED = re.compile(r"fmus\.(kinds|discovery|ports|language\.build\.Untranslatable)(\.|$)")
 
-#: What those import besides that translate components or indices.
+#: Further modules for rooms that translate components or indices.
 TRANSLATED = re.compile(r"fmus\.(documentation|language|native|script)(\.|$)")
 TRANSLATING = (("program",), ("vehicle", "reduction"))
 
@@ -102,10 +102,10 @@ def room(package: str, name: tuple[str, ...]) -> str:
 def test_packages_import_what_they_may(package):
     for path, name in modules(package):
         allowed = ALLOWED[package] | {package} | sys.stdlib_module_names
-        # What only the proof needs never runs inside an FMU.
+        # The proof never runs inside an FMU.
         if package == "auv_fmu" and name[:1] == ("proof",):
             allowed = allowed | {"numpy"}
-        # The face of the product names what it imports on first use.
+        # The package exports functions of the orchestrator on first use.
         if (package, name) == ("auv_fmu", ()):
             allowed = allowed | {"orchestrator"}
         for imported in imports(path):
@@ -119,12 +119,12 @@ def test_packages_import_what_they_may(package):
 def test_imports_run_downwards(package):
     floors = FLOORS[package]
     for path, name in modules(package):
-        # The package's own face hands on names of every floor.
+        # The package itself exports names of every room.
         if not name or name == ("__main__",):
             continue
         own = floors.index(room(package, name))
         for imported in imports(path):
-            # What is no room is a name of the package's own face.
+            # Names that are not rooms belong to the package itself.
             if imported[0] == package and room(package, imported[1:]) in floors:
                 other = floors.index(room(package, imported[1:]))
                 assert other <= own, f"{path} imports {'.'.join(imported)}, which is above it"
@@ -152,7 +152,7 @@ def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
             assert {one[0] for one in imports(path)}.isdisjoint(("auv_fmu", "fmus")), path
 
 
-#: So many names are taken through the door of the master. Fewer is better.
+#: Most names that may be imported from `orchestrator.cosim`; fewer are better.
 MOST_NAMES = 45
 
 
@@ -179,7 +179,7 @@ def is_translating(name: tuple[str, ...]) -> bool:
     return any(name[: len(one)] == one for one in TRANSLATING)
 
 
-def test_the_orchestrator_knows_of_components_only_what_they_declare():
+def test_the_orchestrator_imports_only_declarations_of_components():
     for path, name in modules("orchestrator"):
         for imported in imports(path):
             if imported[0] == "fmus":
@@ -239,7 +239,7 @@ def test_no_modules_import_each_other():
         list(TopologicalSorter(needs).static_order())
 
 
-#: What tells one operating system from another, and the modules of the orchestrator that may ask.
+#: Names that distinguish operating systems, and modules of the orchestrator that may use them.
 ASKS = {("os", "name"), ("sys", "platform"), ("platform", "system"), ("sys", "getwindowsversion")}
 ASKING = {("machine", name) for name in ("compilers", "operating_system")}
 

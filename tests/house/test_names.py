@@ -14,7 +14,7 @@ USERS = (ROOT / "docs" / "reference" / "glossary.md").read_text(encoding="utf-8"
 
 
 def test_a_unit_test_is_named_after_what_it_tests():
-    """A module, or a folder; `auv_fmu` lies in `src`."""
+    """A module, or a folder; `auv_fmu` is in `src`."""
     for path in (ROOT / "tests" / "unit").rglob("test_*.py"):
         tested = path.relative_to(ROOT / "tests" / "unit").with_stem(path.stem[5:])
         found = [ROOT / tested, ROOT / "src" / tested]

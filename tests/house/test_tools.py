@@ -1,4 +1,4 @@
-"""The tools say what they do, and take nothing else for it."""
+"""The tools have help, and refuse unknown options."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 
 FILES = sorted((Path(__file__).parents[2] / "tools").glob("*.py"))
 
-#: Others are parts that several tools have.
+#: Other modules are parts of several tools.
 TOOLS = [file for file in FILES if "__main__" in file.read_text(encoding="utf-8")]
 
 #: Packages of the extras `dev`, `docs` and `studies`.

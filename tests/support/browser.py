@@ -1,4 +1,4 @@
-"""Chromium without a window, asked through a pipe: pages are opened, and expressions evaluated."""
+"""Chromium without a window, controlled through a pipe."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ class Browser:
 
 @contextmanager
 def browser(profile: Path, *options: str) -> Iterator[Browser]:
-    """A browser with a profile and options of its own, ended at the end."""
+    """Start a browser with a profile and options, and end it afterwards."""
     reads, commands = os.pipe()
     answers, writes = os.pipe()
 

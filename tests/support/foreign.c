@@ -15,7 +15,7 @@
 
 enum { ENTER, EXIT, STEP, TERMINATE, FREE };
 enum {
-    BEHAVE, NOT_A_NUMBER, INFINITE, SILENT_ERROR, FATAL, EXITS, CRASHES, ABORTS, HANGS, SPINS,
+    BEHAVE, NOT_A_NUMBER, INFINITE, SILENT_ERROR, FATAL, EXITS, CRASHES, HANGS, SPINS,
     KILLED, WRITES, LOGS, LEAVES_A_PROCESS, CLOSES_ALL, ANSWERS_ITSELF, SIGNALS,
     ALARMS, FORKS, CLOSES_FILES, MOVES, ESCAPES,
 };
@@ -58,8 +58,6 @@ static Status act(Instance *instance, int phase)
     case CRASHES:
         *(volatile int *)NULL = 1;
         break;
-    case ABORTS:
-        abort();
     case HANGS:
         fputs("hangs\n", stderr);
         for (;;)

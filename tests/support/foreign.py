@@ -1,4 +1,4 @@
-"""FMUs that misbehave: one in C, and one from PythonFMU's own builder."""
+"""Misbehaving FMUs: one in C, and one built by PythonFMU."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def build_slave(folder: Path, act: str) -> Path:
 
 
 def foreign_system(fmu: Path, act: str = "BEHAVE", phase: str = "STEP", at: float = 0.1) -> System:
-    """Two instances of the FMU in C; the first feeds the second and misbehaves."""
+    """Two instances of the FMU in C: the first misbehaves and feeds the second."""
     values = {"bad.act": ACTS[act], "bad.phase": PHASES[phase], "bad.at": at, "bad.u": 0.0}
     return connected("foreign", {"bad": fmu, "good": fmu}, {"good.u": "bad.y"}, values)
 

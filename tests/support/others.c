@@ -157,10 +157,6 @@ Status fmi2DoStep(Component c, double t, double h, int no_rollback)
 {
     Instance *it = c;
     it->time = t;
-#ifdef ENDS
-    if (t + h > 0.5)
-        return Discard;
-#endif
 #ifdef ENDS_AT
     it->time = t + h < ENDS_AT ? t + h : ENDS_AT;
     it->sum += (it->time - t) * (1.0 + it->reals[U]);

@@ -47,6 +47,15 @@ def companion(scenario: str) -> Prepared:
     return with_companion(prepare_request(request), request)[1]
 
 
+def compared(scenario: str, **changes: Any) -> list[Table]:
+    """All rows of a scenario and of the run that it is compared with."""
+    request, tables = Request(scenario, kind="native", loop="compiled", **changes), []
+    for run in with_companion(prepare_request(request), request):
+        tables.append(Table())
+        run.run([tables[-1]])
+    return tables
+
+
 class InThisProcess:
     """Tasks one after the other, and counted, instead of workers in processes."""
 

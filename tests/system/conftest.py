@@ -1,4 +1,4 @@
-"""What several tests of whole systems share."""
+"""Fixtures for tests of whole systems."""
 
 from __future__ import annotations
 

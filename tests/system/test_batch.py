@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import pickle
-import subprocess
-import sys
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -39,9 +37,6 @@ KIND = "native"
 
 ORDERS = ("feedthrough", "jacobi")
 
-#: How many runs of each study are tried, and how many steps of each.
-SAMPLES, STEPS = 40, 40
-
 
 @cache
 def systems(*names: str) -> dict[str, System]:
@@ -62,18 +57,18 @@ def engines(*names: str, own: tuple[OwnIndex, ...] = ()) -> tuple[BatchEngine, F
 
 @cache
 def sampled(name: str) -> list[Point]:
-    """Some runs of a ready study, cut short, every second one in the other order."""
+    """Ten runs of a ready study, 40 steps each, every second one in the other order."""
     study = read_study(name)
     space = Space(study, {scenario: load_scenario(scenario, KIND) for scenario in study.scenario})
-    numbers = Random(name).sample(range(len(space)), SAMPLES)
+    numbers = Random(name).sample(range(len(space)), 10)
     return [
-        space[number]._replace(stop_time=STEPS * space[number].step, order=ORDERS[i % len(ORDERS)])
+        space[number]._replace(stop_time=40 * space[number].step, order=ORDERS[i % len(ORDERS)])
         for i, number in enumerate(numbers)
     ]
 
 
 def bits(rows: np.ndarray) -> np.ndarray:
-    """As integers: -0.0 is not 0.0."""
+    """Rows as integers, in which -0.0 differs from 0.0."""
     return np.ascontiguousarray(rows).view(np.int64)
 
 
@@ -82,8 +77,8 @@ def changes(values: Mapping[str, Any]) -> dict[Any, Any]:
 
 
 @pytest.mark.parametrize("name", ready_studies())
-def test_runs_of_studies_are_those_of_the_fmus(name):
-    """All indices; why a run fails is left to the FMUs."""
+def test_runs_of_studies_equal_the_fmus(name):
+    """All indices are equal; the FMUs report why a run fails."""
     runs = sampled(name)
     batch, fmus = engines(*read_study(name).scenario)
     for one, other in zip(batch.outcomes(runs), fmus.outcomes(runs), strict=True):
@@ -103,7 +98,7 @@ def compare_with_fmus(name: str, point: Point, own: tuple[OwnIndex, ...] = ()) -
     assert table.failure is None
     assert len(table.columns) >= 40
     assert table.header.parameters == expected.header.parameters
-    # A program that comes to its end has refused nothing.
+    # A program has no column for refusals.
     faults = {f"{part}.fault" for part in system.components}
     assert {*expected.columns} - {*table.columns} == faults
     rows = np.column_stack([expected.time, expected.group(*table.columns)])
@@ -118,35 +113,37 @@ NOISY = {"plant.noise.std": 0.002, "plant.noise.seed": 5}
 PLANTS_FIRST: Order = ("plant", "disturbance", "planner", "controller")
 
 
-@pytest.mark.parametrize("order", [*ORDERS, None])
-@pytest.mark.parametrize("name", ["fig4", "fig5-pd", "path", "sea", "remus", "remus-pd"])
-def test_every_column_is_that_of_the_fmus(name, order):
-    compare_with_fmus(name, Point(0, name, NOISY, 10.01, 0.02, order))
+@pytest.mark.parametrize(
+    ("name", "order"), [("fig4", None), ("fig5-pd", "jacobi"), ("path", "feedthrough"),
+                        ("sea", None), ("remus", "jacobi"), ("remus-pd", "feedthrough")]
+)  # fmt: skip
+def test_every_column_equals_the_fmus(name, order):
+    compare_with_fmus(name, Point(0, name, NOISY, 4.01, 0.02, order))
 
 
 @pytest.mark.parametrize(
     "order", ["feedthrough", "jacobi", PLANTS_FIRST, PLANTS_FIRST[::-1]], ids=str
 )
-def test_orders_are_those_of_the_fmus(order):
+def test_orders_equal_the_fmus(order):
     """One engine makes runs of all orders. An exact observer shows the gain of the step before."""
-    for observer in ("euler", "exact"):
-        values = {**NOISY, "controller.observer": observer}
-        compare_with_fmus("fig5", Point(0, "fig5", values, 2.01, 0.02, order))
+    values = {**NOISY, "controller.observer": "exact"}
+    compare_with_fmus("fig5", Point(0, "fig5", values, 2.01, 0.02, order))
 
 
-@pytest.mark.parametrize("name", ["formation-v", "formation-change"])
-@pytest.mark.parametrize("order", ORDERS)
-def test_fleets_are_those_of_the_fmus(name, order):
+@pytest.mark.parametrize(
+    ("name", "order"), [("formation-v", "feedthrough"), ("formation-change", "jacobi")]
+)
+def test_fleets_equal_the_fmus(name, order):
     """The smallest distance between vehicles is among the indices; a star means all of them."""
     values = {"auv*.plant.noise.std": 0.01, "auv2.plant.m11": 26.0, "auv3.controller.K1": (9, 9, 8)}
-    point = Point(0, name, values, 5.01, 0.02, order)
+    point = Point(0, name, values, 2.01, 0.02, order)
     compare_with_fmus(name, point)
     [outcome] = engines(name)[0].outcomes([point])
     assert outcome.indices["smallest_distance"] > 0.0
 
 
 @pytest.mark.parametrize(("name", "start"), [("fig4", -1.0), ("path", 10.0)])
-def test_start_times_are_those_of_the_fmus(tmp_path, name, start):
+def test_start_times_equal_the_fmus(tmp_path, name, start):
     times = {"start_time": start, "stop_time": start + 4.0, "step": 0.02}
     write_ssp(replace(systems(name)[name], name="later", **times), tmp_path)
     point = Point(0, "", NOISY, start + 4.0, 0.02, start_time=start)
@@ -157,43 +154,14 @@ def test_start_times_are_those_of_the_fmus(tmp_path, name, start):
     ("slow", "order"),
     [("controller = 0.2", "jacobi"), ("planner = 0.06\ndisturbance = 0.04", PLANTS_FIRST)],
 )
-def test_components_with_longer_steps_are_those_of_the_fmus(tmp_path, slow, order):
+def test_components_with_longer_steps_equal_the_fmus(tmp_path, slow, order):
     path = tmp_path / "slow.toml"
     path.write_text(f"stop_time = 4.0\n[steps]\n{slow}\n")
     compare_with_fmus(str(path), Point(0, "", NOISY, 4.0, 0.02, order))
 
 
-REMUS_IN_A_SEA = """
-[components]
-plant = "Remus100"
-allocation = "Allocation"
-sea = "Sea"
-[wires]
-"allocation.tau" = "controller.tau"
-"allocation.nu_r" = "plant.nu_r"
-"plant.command" = "allocation.command"
-"plant.tau" = false
-"plant.tau_w" = false
-"disturbance.nu" = false
-"sea.eta" = "plant.eta"
-"plant.water" = "sea.water"
-"plant.dwater" = "sea.dwater"
-[parameters]
-plant.ell = 0.8
-plant.eta0.z = 2.0
-plant.noise.std = 0.001
-plant.current.y = 0.1
-allocation.measured = true
-sea.waves.spectrum = "pierson-moskowitz"
-sea.depth = 0.0
-controller.ell = 0.8
-planner.ell = 0.8
-planner.eta0.z = 2.0
-"""
-
-#: Systems that have parts more, or fewer.
+#: Systems with more or fewer parts.
 OTHERS = {
-    "remus in a sea": REMUS_IN_A_SEA,
     "two planners": '[components]\nmore = "MotionPlanner"\n',
     "an open loop": '[wires]\n"controller.y" = false\n',
     "fed back": '[wires]\n"controller.y_d" = "plant.y"\n',
@@ -201,13 +169,13 @@ OTHERS = {
 
 
 @pytest.mark.parametrize(("name", "order"), zip(OTHERS, cycle(ORDERS), strict=False))
-def test_other_systems_are_those_of_the_fmus(tmp_path, name, order):
+def test_other_systems_equal_the_fmus(tmp_path, name, order):
     path = tmp_path / "own.toml"
     path.write_text(OTHERS[name])
     compare_with_fmus(str(path), Point(0, "", {}, 4.01, 0.02, order))
 
 
-def test_a_controller_of_ones_own_is_that_of_its_fmu(workplace):
+def test_a_users_controller_equals_its_fmu(workplace):
     assert main(["new", "controller", "my_law"]) == 0
     script, scenario = Path("my_law/my_law.py"), Path("my_law/my_law.toml")
     assert main(["build", str(script), "--kind", KIND]) == 0
@@ -218,74 +186,24 @@ def test_a_controller_of_ones_own_is_that_of_its_fmu(workplace):
     assert mentions(str(refused.value), "mine: my_law.py changed --engine fmu")
 
 
-#: Values that make a difference to how a loop is computed.
-ADDITIONS: list[tuple[str, dict[str, Any]]] = [
-    ("fig4", {"controller.saturation": "algebraic"}),
-    ("fig4", {"controller.saturation": "arctan", "controller.observer": "exact"}),
-    ("fig4", {"controller.observer": "integral", "controller.printed_jacobian": True}),
-    (
-        "fig4",
-        {"controller.innovation_gate": 0.001, "plant.noise.std": 0.01, "plant.noise.seed": -7},
-    ),
-    ("fig4", {"plant.roll": False, "plant.noise.std": 0.001}),
-    ("fig4", {"plant.current.x": 0.4, "plant.current.z": -0.2}),
-    ("fig4", {"plant.actuator.T.u": 0.3, "plant.actuator.T.r": 0.05, "plant.tau_max.u": 20.0}),
-    ("fig4", {"plant.integrator": "rk4", "plant.current.y": 0.3, "plant.actuator.T.q": 0.1}),
-    ("fig4", {"plant.integrator": "rk4", "plant.roll": False, "plant.h_max": 0.01}),
-    ("fig4", {"planner.nu0.u": 0.2, "planner.h_max": 0.003, "controller.h_max": 0.007}),
-    ("fig4", {"plant.ell": 0.5, "plant.h_max": 0.004, "planner.m11": 20.0}),
-    ("path", {"planner.cruise": 0.4, "planner.rounding": 40.0, "plant.water.y": 0.1}),
-    ("path", {"planner.timed": True, "planner.count": 4, "planner.waypoint[1].t": 0.01}),
-    ("path", {"plant.dwater.x": 0.1}),
-    ("sea", {"sea.waves.spectrum": "none", "sea.current.mu": 0.5, "sea.current.root": 0.0}),
-    ("sea", {"sea.waves.count": 64, "sea.waves.s": 0.0, "sea.depth": 6.0, "sea.waves.Hs": 0.5}),
-    ("sea", {"plant.integrator": "rk4", "plant.current.z": 0.1, "plant.h_max": 0.007}),
-    ("sea", {"plant.roll": False, "plant.actuator.T.u": 0.2, "sea.waves.seed": -3}),
-    ("remus", {"plant.h_max": 0.004, "plant.water.x": 0.3, "plant.current.y": -0.1}),
-    ("remus", {"allocation.measured": True, "plant.r_bg.y": 0.001, "plant.fin.T": 0.0}),
-    ("remus", {"disturbance.nu.r": 0.1}),
-]
+# Refusals
 
 
-@pytest.mark.parametrize(("of", "order"), zip(ADDITIONS, cycle(ORDERS), strict=False))
-def test_additions_are_those_of_the_fmus(of, order):
-    name, values = of
-    compare_with_fmus(name, Point(0, name, values, 2.01, 0.02, order))
-
-
-# What is refused
-
-
-#: What components refuse: values, values that do not fit, starts, steps.
+#: Refused by components: values, values that do not fit, starts, steps.
 MISTAKES: list[tuple[str, dict[str, Any]]] = [
-    ("fig4", {"controller.gamma": -1.0}),
     ("fig4", {"plant.tau_min.u": 0.0, "plant.tau_max.u": 0.0, "planner.eta0.theta": 1.6}),
     ("fig4", {"plant.roll": False, "plant.nu0.p": 0.1}),
-    ("fig4", {"plant.eta0.x": 1e101}),
-    ("fig4", {"plant.ell": 1e308}),
     ("fig4", {"plant.h_max": 1e-9, "controller.h_max": 1e-9}),
-    ("fig4", {"planner.tau_d.q": 40.0}),
     ("fig4", {"plant.m11": 1e-9}),
-    ("fig4", {"plant.m66": 1e-3, "planner.tau_d.q": 50.0}),
-    ("fig4", {"disturbance.omega_d": 1e308}),
-    ("fig4", {"disturbance.A_d": 1.7e308, "disturbance.A_f": 1.7e308}),
-    ("fig4", {"controller.gamma": 1e200}),
-    ("path", {"planner.cruise": 2.0, "planner.rounding": 0.5}),
     ("path", {"planner.timed": True, "planner.waypoint[3].t": 1.0}),
-    ("path", {"planner.ell": 1e308}),
     ("sea", {"sea.waves.Hs": 20.0}),
-    ("sea", {"sea.current.sigma": 1e200}),
-    ("sea", {"plant.m11": 1e-9}),
-    ("remus", {"plant.nu0.u": 11.0}),
-    ("remus", {"plant.diameter": 1.5}),
     ("remus", {"plant.drag.T.yaw": 1e-3}),
-    ("remus", {"plant.current.x": 9.9, "controller.gamma": 1e200}),
 ]
 
 
-@pytest.mark.parametrize(("of", "order"), zip(MISTAKES, cycle(ORDERS), strict=False))
-def test_what_fmus_refuse_is_refused(of, order):
-    name, values = of
+@pytest.mark.parametrize(("mistake", "order"), zip(MISTAKES, cycle(ORDERS), strict=False))
+def test_the_engine_refuses_the_same_as_the_fmus(mistake, order):
+    name, values = mistake
     point = Point(5, name, values, 3.0, 0.02, order)
     [[one], [other]] = (engine.outcomes([point]) for engine in engines(name))
     assert other.failure
@@ -294,14 +212,14 @@ def test_what_fmus_refuse_is_refused(of, order):
         engines(name)[0].table(point)
 
 
-SCALED = """
+COMPONENT = """
 from typing import Annotated, NamedTuple
 
 from auv_fmu import Variable
 
 
 class Parameters(NamedTuple):
-    k: Annotated[float, Variable("1", "Factor")] = 3.0
+    k: Annotated[float, Variable("1", "Factor")] = 1.0
 
 
 class Inputs(NamedTuple):
@@ -309,78 +227,58 @@ class Inputs(NamedTuple):
 
 
 class Outputs(NamedTuple):
-    y: Annotated[float, Variable("m", "The same, scaled")]
+    y: Annotated[float, Variable("m", "Another number")]
 
 
 def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:
-    return Outputs(parameters.k * inputs.x)
-"""
-
-HALVED = """
-from typing import Annotated, NamedTuple
-
-from auv_fmu import Variable
-
-
-class Inputs(NamedTuple):
-    x: Annotated[float, Variable("m", "A number")]
-
-
-class Outputs(NamedTuple):
-    small: Annotated[float, Variable("m", "The same, halved until it is small")]
-
-
-def outputs(inputs: Inputs) -> Outputs:
-    x = inputs.x
-    while abs(x) > 1.0:
-        x = x / 2.0
+    x = parameters.k * inputs.x
+    STATEMENT
     return Outputs(x)
 """
 
 
-def test_what_a_loop_would_never_end_with_is_refused_before(workplace):
-    for name, text in (("scaled", SCALED), ("halved", HALVED)):
-        Path(f"{name}.py").write_text(text)
+def test_values_that_would_make_a_loop_endless_are_refused(workplace):
+    statements = {"scaled": "x = 3.0 * x", "halved": "while abs(x) > 1.0:\n        x = x / 2.0"}
+    for name, statement in statements.items():
+        Path(f"{name}.py").write_text(COMPONENT.replace("STATEMENT", statement))
         assert main(["build", f"{name}.py", "--kind", KIND]) == 0
     Path("own.toml").write_text(
         '[components]\nscaled = "Scaled.fmu"\nhalved = "Halved.fmu"\n'
         '[wires]\n"scaled.x" = "planner.y_d.x"\n"halved.x" = "scaled.y"\n'
     )
     path = str(Path("own.toml").resolve())
-    compare_with_fmus(path, Point(0, "", {}, 4.01, 0.02, "jacobi"))
     # The reference comes beyond x = 1.1 m after 5.4 s.
-    point = Point(0, path, {"scaled.k": 1.7e308}, 20.0, 0.02, "jacobi")
+    point = Point(0, path, {"scaled.k": 6e307}, 20.0, 0.02, "jacobi")
     assert [*BatchEngine({path: load(path, KIND)}).outcomes([point])] == [(0, {}, REFUSED, None)]
 
 
 def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    values = {"planner.tau_d.q": [1.0, 40.0, 45.0], "plant.noise.std": [0.0, 0.001]}
-    study = {"scenario": "fig4", "stop_time": 3.0, "vary": values}
+    study = {"scenario": "fig4", "stop_time": 3.0, "vary": {"planner.tau_d.q": [1.0, 40.0, 45.0]}}
     one, other = (
         sweep(study, engine=engine, kind=KIND, workers=1, out=tmp_path / engine)
         for engine in ("batch", "fmu")
     )
     assert list(one) == list(other)
-    assert [*one["failure"][:2]] == [None, None]
-    assert all("SteepReference" in failure for failure in one["failure"][2:])
+    assert one["failure"][0] is None
+    assert all("SteepReference" in failure for failure in one["failure"][1:])
     for name in one:
         assert str(one[name].tolist()) == str(other[name].tolist()), name
-    assert (one.failed, one.cautions) == (4, other.cautions)
+    assert (one.failed, one.cautions) == (2, other.cautions)
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    ("content", "words"),
     [
         ('[[events]]\nat = 0.5\nfreeze = "plant.y"\n', "own events 'batch'"),
         ('coupling = "linear"\n', "coupling linear"),
     ],
 )
-def test_what_no_program_can_be_is_refused_by_name(workplace, refused, content, said):
+def test_scenarios_outside_the_engine_are_refused_by_name(workplace, refused, content, words):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     Path("own.toml").write_text(f"stop_time = 1.0\n{content}")
     Path("mine.toml").write_text('scenario = "own.toml"\nengine = "batch"\n')
-    assert mentions(refused("sweep", "mine.toml", "--kind", KIND), said)
+    assert mentions(refused("sweep", "mine.toml", "--kind", KIND), words)
 
 
 def test_an_fmu_of_another_tool_is_refused_by_name(tmp_path):
@@ -394,19 +292,18 @@ def test_an_fmu_of_another_tool_is_refused_by_name(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["fig4", "formation-v"])
-def test_an_index_of_ones_own_is_that_of_the_fmus(name):
+def test_a_users_index_is_the_same_in_both_engines(name):
     own = (OwnIndex("largest_depth", Path(largest_depth.__file__).read_bytes()),)
-    run = Point(0, name, {}, 10.01, 0.02)
+    run = Point(0, name, {}, 2.01, 0.02)
     compare_with_fmus(name, run, own)
     [outcome] = engines(name, own=own)[0].outcomes([run])
     assert any(key.endswith("largest_depth") for key in outcome.indices)
 
 
-@pytest.mark.parametrize("name", ["fig4", "formation-v"])
-def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus(name):
-    """Before its first run as after it, if its program is prepared."""
-    batch = BatchEngine(systems(name))
-    run = Point(0, name, {}, 0.5, 0.02)
+def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
+    """Before and after its first run, if its program is prepared."""
+    batch = BatchEngine(systems("fig4"))
+    run = Point(0, "fig4", {}, 0.5, 0.02)
     batch.prepare(run)
     copies = [pickle.loads(pickle.dumps(batch))]
     [outcome] = batch.outcomes([run])
@@ -420,38 +317,8 @@ def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus(name):
 
 def test_threads_have_noise_of_their_own():
     batch, _ = engines("fig4")
-    runs = [Point(i, "fig4", {"plant.noise.seed": i}, 5.0, 0.02) for i in range(20)]
+    runs = [Point(i, "fig4", {"plant.noise.seed": i}, 2.0, 0.02) for i in range(12)]
     with ThreadPoolExecutor(4) as pool:
         side_by_side = list(pool.map(lambda run: next(batch.outcomes([run])), runs))
     assert side_by_side == list(batch.outcomes(runs))
     assert len({outcome.indices["late_error"] for outcome in side_by_side}) == len(runs)
-
-
-def test_threads_make_a_study_that_one_makes(tmp_path):
-    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    starts = {"from": -5.0, "to": 5.0, "n": 40}
-    study = {"scenario": "fig5", "stop_time": 5.0, "vary": {"plant.eta0.y": starts}}
-    one, four = (
-        sweep(study, engine="batch", workers=n, out=tmp_path / str(n)).to_dataframe()
-        for n in (1, 4)
-    )
-    assert one.equals(four)
-
-
-def test_another_process_finds_the_program_compiled(tmp_path):
-    """And needs no compiler."""
-    text = (
-        "from orchestrator.program import library\n"
-        "from orchestrator.studies.engine import Point\n"
-        "import pickle, sys\n"
-        "library.compile_text = lambda *_: sys.exit('it compiles')\n"
-        "engine = pickle.load(sys.stdin.buffer)\n"
-        "print(*engine.outcomes([Point(0, 'fig4', {}, 0.1, 0.02)]))\n"
-    )
-    batch, _ = engines("fig4")
-    outcomes = list(batch.outcomes([Point(0, "fig4", {}, 0.1, 0.02)]))
-    said = subprocess.run(
-        [sys.executable, "-c", text],
-        input=pickle.dumps(batch), capture_output=True, check=True, cwd=tmp_path,
-    )  # fmt: skip
-    assert said.stdout.decode().split() == str(outcomes[0]).split()

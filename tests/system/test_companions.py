@@ -1,4 +1,4 @@
-"""A scenario and what it is compared with: the same but for what `[compare]` says."""
+"""A scenario and what it is compared with: equal except for the entries of `[compare]`."""
 
 from __future__ import annotations
 
@@ -9,38 +9,32 @@ import numpy as np
 import pytest
 
 from orchestrator.commands.main import main
-from orchestrator.cosim import PortName, Table
+from orchestrator.cosim import PortName
 from orchestrator.runs.preparation import load_scenario, prepare, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.vehicle.signals import STANDARD
-from support.markdown import DOCS, blocks
-from support.runs import PD
+from support.runs import PD, compared
 from support.texts import mentions
 
 WAYPOINTS = "x,y,z\n0,0,-2\n3,0,-2\n3,3,-2\n"
 
 
 def pair_of(text, **request):
-    """The two runs, from the text of a scenario."""
+    """Prepare both runs of a scenario, from its text."""
     Path("mine.toml").write_text(text)
     request = Request(kind="native", **request)
     return with_companion(prepare(*load_scenario("mine.toml", "native"), request), request)
 
 
-def runs_of(text, stop_time=1.0):
-    tables = []
-    for prepared in pair_of(f"stop_time = {stop_time}\n{text}"):
-        table = Table()
-        prepared.run([table])
-        tables.append(table)
-    return tables
+def runs_of(text):
+    Path("mine.toml").write_text(f"stop_time = 1.0\n{text}")
+    return compared("mine.toml")
 
 
 @pytest.mark.parametrize(
     "text",
     [
-        PD,
         "[parameters]\nplanner.eta0.z = -10.0\n" + PD,
         '[components]\nplanner = "PathPlanner"\n[path]\nfile = "path.csv"\n' + PD,
         "[steps]\nplanner = 0.1\n" + PD,
@@ -53,14 +47,7 @@ def test_both_follow_the_reference_of_the_scenario(workplace, text):
     assert not np.array_equal(ours["plant.eta.x"], theirs["plant.eta.x"])
 
 
-def test_both_follow_the_same_reference_in_the_example_of_the_guide(workplace):
-    example = next(block.text for block in blocks(DOCS / "how-to" / "events.md", "toml"))
-    ours, theirs = runs_of(example.replace("stop_time = 40.0\n", ""), 12.0)
-    assert ours["planner.y_d.z"][0] == -2.0
-    assert np.array_equal(ours.group(*STANDARD.y_d), theirs.group(*STANDARD.y_d))
-
-
-def test_only_what_is_said_differs(workplace):
+def test_only_the_listed_differences_differ(workplace):
     ours, theirs = pair_of(
         'only = ["plant", "controller", "planner"]\n'
         '[components]\nplanner = "PathPlanner"\n'
@@ -77,8 +64,8 @@ def test_only_what_is_said_differs(workplace):
     assert replace(theirs.scenario, compare=None).legend == "PD"
 
 
-def test_parameters_of_the_user_win_over_those_of_the_comparison(workplace):
-    """And these over those of the scenario; what a controller lacks is left out."""
+def test_parameters_of_the_user_win_over_the_comparison(workplace):
+    """The comparison wins over the scenario; parameters that a controller lacks are left out."""
     text = (
         "[parameters]\nplant.m11 = 26.0\ncontroller.eps_t = 2.0\ncontroller.k_d = 40.0\n"
         + PD
@@ -100,7 +87,7 @@ def test_a_table_of_inputs_goes_for_both(workplace):
         assert set(table["plant.water.x"]) == {0.25, 0.3}
 
 
-def test_wires_are_removed_whoever_has_stated_them(workplace):
+def test_wires_are_removed_in_either_table(workplace):
     own = '[components]\ncontroller = "PdController"\n[wires]\n"controller.dy" = "plant.dy"\n'
     other = '[compare]\nname = "proposed"\ncomponents.controller = "ObserverController"\n'
     wires = 'wires."controller.dy" = false\nwires."plant.tau_w" = false\n'
@@ -112,20 +99,11 @@ def test_wires_are_removed_whoever_has_stated_them(workplace):
     }
 
 
-def test_what_is_compared_may_be_anything(workplace):
-    heavy, light = runs_of('compare = { name = "light", parameters.plant.m11 = 20.0 }\n')
-    assert abs(heavy["plant.nu.u"][-1]) < abs(light["plant.nu.u"][-1])
-
-
 def test_references_that_differ_are_said(workplace, capsys):
     Path("mine.toml").write_text("stop_time = 1.0\n" + PD + "parameters.planner.tau_d.u = 3.0\n")
     assert main(["run", "mine.toml", "--no-figures", "--kind", "native"]) == 0
-    said = capsys.readouterr().err
-    assert mentions(said, "pd: reference planner.y_d mine")
-    for name in ("fig5", "path"):
-        assert read_scenario(name).compare
-        assert main(["run", name, "--stop-time", "1", "--no-figures", "--kind", "native"]) == 0
-        assert "its reference" not in capsys.readouterr().err
+    message = capsys.readouterr().err
+    assert mentions(message, "pd: reference planner.y_d mine")
 
 
 COMPARED = [name for name in names() if read_scenario(name).compare]
@@ -133,7 +111,7 @@ COMPARED = [name for name in names() if read_scenario(name).compare]
 
 @pytest.mark.parametrize("name", COMPARED)
 def test_the_ready_scenarios_compare_the_other_controller(name):
-    """In the same surroundings."""
+    """Everything else is the same."""
     request = Request(kind="native")
     ours, theirs = (
         one.system
@@ -154,20 +132,8 @@ def test_the_ready_scenarios_compare_the_other_controller(name):
 
 @pytest.mark.parametrize("name", ["fig5", "fig6"])
 def test_scenarios_of_the_pd_controller_are_the_companions(name):
-    """Figures 5 and 6 have one each, which is promised."""
+    """Figures 5 and 6 have one each."""
     request = Request(kind="native")
     _, companion = with_companion(prepare(*load_scenario(name, "native"), request), request)
     own = prepare(*load_scenario(f"{name}-pd", "native"), request)
     assert own.identity == companion.identity
-
-
-def test_the_name_of_a_scenario_is_no_longer_a_comparison(workplace, capsys):
-    Path("mine.toml").write_text('compare = "fig5-pd"\n')
-    assert main(["run", "mine.toml"]) == 2
-    [line] = capsys.readouterr().err.splitlines()
-    written = line[line.index("{") : line.rindex("}") + 1]
-    Path("mine.toml").write_text(f"compare = {written}\n")
-    assert [one.scenario.name for one in pair_of(Path("mine.toml").read_text())] == [
-        "mine",
-        "mine-pd",
-    ]

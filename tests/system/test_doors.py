@@ -1,4 +1,4 @@
-"""What is run besides scenarios and SSPs: one FMU, an unpacked SSP, and libcosim's own files."""
+"""Other things that can be run: one FMU, an unpacked SSP, and files of libcosim."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim import write_osp, write_ssp
+from orchestrator.cosim import write_ssp
 from orchestrator.cosim.formats.osp import OSP_STRUCTURE
 from orchestrator.machine.errors import InputError
 from support.archives import archive, component, described, fmu, system, variable
@@ -24,7 +24,7 @@ from support.texts import mentions
 
 STEP, STEPS = 0.125, 24
 
-#: A ring by way of a function, written from both ends, with a component of a longer step.
+#: A ring through a function, with connections in both directions, and a longer step.
 OSP = f"""<?xml version="1.0"?>
 <OspSystemStructure xmlns="http://opensimulationplatform.com/MSMI/OSPSystemStructure" version="0.1">
   <StartTime>0.0</StartTime><BaseStepSize>{STEP}</BaseStepSize><Algorithm>fixedStep</Algorithm>
@@ -59,7 +59,7 @@ OSP = f"""<?xml version="1.0"?>
 </OspSystemStructure>
 """
 
-#: Reads a file of libcosim's and prints all outputs, a line a step.
+#: Runs a file of libcosim's, and prints all outputs after each step.
 LIBCOSIM = """
 import sys
 from libcosimpy.CosimExecution import CosimExecution
@@ -94,9 +94,9 @@ def outputs_of_libcosim(folder: Path, *names: str) -> np.ndarray:
     if find_spec("libcosimpy") is None:
         pytest.skip("libcosimpy is not installed")
     arguments = [sys.executable, "-c", LIBCOSIM, str(folder), str(STEPS), *names]
-    said = subprocess.run(arguments, capture_output=True, text=True, check=True, timeout=60).stdout
+    done = subprocess.run(arguments, capture_output=True, text=True, check=True, timeout=60)
     # It logs to the same stream.
-    rows = [line.split()[1:] for line in said.splitlines() if line.startswith("row ")]
+    rows = [line.split()[1:] for line in done.stdout.splitlines() if line.startswith("row ")]
     return np.array([[float.fromhex(value) for value in row] for row in rows])
 
 
@@ -110,18 +110,6 @@ def test_osp_file_gives_the_numbers_of_libcosim(osp: Path):
     assert np.ptp(expected, axis=0)[[0, 1, 2, 3, 5]].min() > 0.05
 
 
-def test_what_is_written_for_libcosim_is_read_again(dist: Path, tmp_path: Path):
-    """Components, connections, parameters and steps of the closed loop."""
-    system = load("fig5")
-    write_osp(system, tmp_path)
-    again = load(tmp_path)
-    assert set(again.connections) == set(system.connections)
-    assert again.parameters == system.parameters
-    assert (again.step, again.start_time or 0.0) == (system.step, system.start_time or 0.0)
-    digests = [{n: c.digest for n, c in one.components.items()} for one in (system, again)]
-    assert digests[0] == digests[1]
-
-
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
@@ -131,18 +119,14 @@ def test_what_is_written_for_libcosim_is_read_again(dist: Path, tmp_path: Path):
         ("VariableConnection>", "VariableGroupConnection>", "<VariableGroupConnection> 2"),
         ('name="in"/>', 'name="into"/>', "scaled: 0"),
         ('function="scaled" name="in"', 'function="scale" name="in"', "'scale'"),
-        ('simulator="c" name="v"', 'simulator="c" name="w"', "c 'w'"),
         ('simulator="b" name="y"', 'simulator="d" name="y"', "'d'"),
         ('<Real value="0.7"/>', '<Real value="much"/>', "a.v much"),
-        ('<Real value="0.7"/>', "", "a.v: value"),
         ('name="b" source', 'name="a" source', "two a"),
-        ('source="relay.fmu" stepSize', 'source="none.fmu" stepSize', "'none.fmu' b"),
         ('"../fmus/relay%20one.fmu"', '"proxyfmu://host?file=x.fmu"', "'proxyfmu://host?file=x"),
         (f"<BaseStepSize>{STEP}<", "<BaseStepSize>fast<", "BaseStepSize 'fast'"),
-        ("<OspSystemStructure ", "<OspSystem ", "tag"),
     ],
 )  # fmt: skip
-def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, why):
+def test_an_osp_file_that_cannot_be_run_is_refused_by_name(osp: Path, old, new, why):
     assert old in OSP
     (osp / OSP_STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
     with pytest.raises(InputError) as error:
@@ -150,16 +134,13 @@ def test_what_of_an_osp_file_cannot_be_run_is_said_by_name(osp: Path, old, new, 
     assert mentions(str(error.value), why) and "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "why"),
-    [
-        ("fixedStep", "ecco", "'ecco'"),
-        (f'"{2 * STEP}"', f'"{2.03 * STEP}"', "b: .* 0.25375 s .* 0.25 s"),
-    ],
-)
-def test_what_of_an_osp_file_changes_is_a_warning(osp: Path, old, new, why):
-    (osp / OSP_STRUCTURE).write_text(OSP.replace(old, new), encoding="utf-8")
-    with pytest.warns(UserWarning, match=why):
+def test_changes_to_an_osp_file_are_warnings(osp: Path):
+    text = OSP.replace("fixedStep", "ecco").replace(f'"{2 * STEP}"', f'"{2.03 * STEP}"')
+    (osp / OSP_STRUCTURE).write_text(text, encoding="utf-8")
+    with (
+        pytest.warns(UserWarning, match="'ecco'"),
+        pytest.warns(UserWarning, match=r"b: .* 0.25375 s .* 0.25 s"),
+    ):
         assert load(osp).steps["b"] == 2 * STEP
 
 
@@ -211,7 +192,7 @@ def test_export_names_the_values_that_other_tools_may_leave_out(
     assert mentions(line, f"m.p2 {kind} {tools}") and "p1" not in line
 
 
-@pytest.mark.parametrize("name", ["", "SystemStructure.ssd", "Winter.ssd"])
+@pytest.mark.parametrize("name", ["", "Winter.ssd"])
 def test_an_unpacked_ssp_is_what_the_archive_is(tmp_path: Path, name: str):
     relay(tmp_path)
     twice = described(system(component("a") + component("b")))
@@ -228,6 +209,9 @@ def test_an_unpacked_ssp_is_what_the_archive_is(tmp_path: Path, name: str):
 
 
 def test_a_folder_runs_from_within_and_may_lack_a_stop_time(workplace: Path, capsys):
+    """A scenario wins over a folder of its name."""
+    Path("fig4").mkdir()
+    assert "plant" in load("fig4").components
     [path] = write_ssp(load(relay(workplace)), workplace)
     Path("inside").mkdir()
     with ZipFile(path) as content:
@@ -239,24 +223,17 @@ def test_a_folder_runs_from_within_and_may_lack_a_stop_time(workplace: Path, cap
     assert Path("results/result.csv").read_text().count("\n") > 10
 
 
-def test_a_scenario_wins_over_a_folder_of_its_name(dist: Path, workplace: Path):
-    Path("fig4").mkdir()
-    assert "plant" in load("fig4").components
-
-
 @pytest.mark.parametrize(
     ("name", "why"),
     [
         ("mine.mo", ".toml .ssp .ssd .fmu OspSystemStructure.xml"),
         ("empty", "empty: SystemStructure.ssd"),
         ("none.ssd", "none.ssd"),
-        ("none.xml", "none.xml:"),
         ("other.xml", "OspSystemStructure.xml <other>"),
         ("text.xml", "OspSystemStructure.xml: syntax"),
-        ("none.fmu", "none.fmu:"),
     ],
 )
-def test_what_is_none_of_these_is_refused_in_one_line(workplace: Path, capsys, name, why):
+def test_other_files_are_refused_in_one_line(workplace: Path, capsys, name, why):
     Path("empty").mkdir()
     Path("other.xml").write_text("<other/>")
     Path("text.xml").write_text("text")
@@ -300,21 +277,14 @@ def wired(workplace: Path) -> Path:
 
 def test_a_scenario_wires_single_ports_beside_groups(dist: Path, wired: Path):
     found = {str(wire.target): str(wire.source) for wire in load(wired).connections}
-    assert found == {
-        "g.u": "t.y",
-        "x.w[1]": "t.z[2]",
-        "x.in.a": "t.out.a",
-        "x.in.b": "t.out.b",
-    }
+    assert found == {"g.u": "t.y", "x.w[1]": "t.z[2]", "x.in.a": "t.out.a", "x.in.b": "t.out.b"}
 
 
 @pytest.mark.parametrize(
     ("wire", "why"),
     [
         ('"g.u" = "t.out"', "g.u t 'out' out.a out.b"),
-        ('"g.u" = "t.yy"', "g.u t 'yy' y?"),
-        ('"x.in" = "t.one"', "t.one x.in "
-         "in.a in.b?"),
+        ('"x.in" = "t.one"', "t.one x.in in.a in.b?"),
         ('"g.sped" = "t.y"', "g sped sped.* speed?"),
         ('"g.u" = "tt.y"', "'tt' t?"),
         ('"t.y" = "g.u"', "g.u input output"),

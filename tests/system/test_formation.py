@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cache
 from itertools import combinations
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from orchestrator import load, read, simulate
-from orchestrator.commands.main import main
+from orchestrator import load, simulate
+from orchestrator.cosim import Table
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.vehicle.signals import loops_of
+from support.runs import compared
 
 VEHICLES = ("auv1", "auv2", "auv3")
 
@@ -19,8 +20,8 @@ VEHICLES = ("auv1", "auv2", "auv3")
 class Fleet:
     """Tracking errors and distances of a result, from its columns."""
 
-    def __init__(self, folder: Path) -> None:
-        self.result = read(folder)
+    def __init__(self, result: Table) -> None:
+        self.result = result
         self.time = self.result.time
         self.errors = np.array([self._error(name) for name in VEHICLES])
         places = [self.group(f"{name}.plant.eta", "xyz") for name in VEHICLES]
@@ -45,23 +46,13 @@ class Fleet:
         return float(max(np.abs(self.result[f"{name}.plant.tau.u"]).max() for name in VEHICLES))
 
 
-@pytest.fixture(scope="module")
-def fleets(tmp_path_factory: pytest.TempPathFactory):
+@cache
+def fleets(name: str) -> list[Fleet]:
     """Both runs of a scenario, made once."""
-    made: dict[str, tuple[Fleet, Fleet]] = {}
-
-    def run(name: str) -> tuple[Fleet, Fleet]:
-        if name not in made:
-            folder = tmp_path_factory.mktemp("formation") / name
-            options = ["--kind", "native", "--no-figures", "--out", str(folder)]
-            assert main(["run", name, *options]) == 0
-            made[name] = Fleet(folder), Fleet(next(folder.glob("*-pd")))
-        return made[name]
-
-    return run
+    return [Fleet(table) for table in compared(name)]
 
 
-def test_a_v_is_followed_as_its_remark_says(fleets):
+def test_a_v_is_followed_as_its_remark_says():
     proposed, pd = fleets("formation-v")
     assert proposed.largest(25.0) == pytest.approx(0.27, abs=0.005)
     assert pd.largest(25.0) == pytest.approx(0.44, abs=0.005)
@@ -69,7 +60,7 @@ def test_a_v_is_followed_as_its_remark_says(fleets):
     assert 74.0 < proposed.peak() < 75.0 and 31.0 < pd.peak() < 32.0
 
 
-def test_a_formation_changes_as_its_remark_says(fleets):
+def test_a_formation_changes_as_its_remark_says():
     proposed, pd = fleets("formation-change")
     assert proposed.largest(25.0) == pytest.approx(0.38, abs=0.005)
     assert pd.largest(25.0) == pytest.approx(0.56, abs=0.005)
@@ -78,7 +69,7 @@ def test_a_formation_changes_as_its_remark_says(fleets):
         assert 75.0 < fleet.time[fleet.distance.argmin()] < 95.0
 
 
-def test_followers_lose_their_leader_as_the_remark_says(fleets):
+def test_followers_lose_their_leader_as_the_remark_says():
     proposed, pd = fleets("formation-lost-link")
     assert 1.7 < proposed.largest(25.0) < 1.8 and 2.2 < pd.largest(25.0) < 2.3
     assert proposed.largest(100.0) == pytest.approx(0.12, abs=0.005)
@@ -91,16 +82,16 @@ def test_followers_lose_their_leader_as_the_remark_says(fleets):
         assert lost[during][-1] - lost[during][0] == pytest.approx(20, abs=1)
 
 
-def test_the_first_place_has_the_errors_of_a_vehicle_alone():
-    """It is the leader's own, and the same run: so are indices that compare at one instant."""
+def test_the_first_place_has_the_errors_of_a_single_vehicle():
+    """The first place is the leader's, so rows and final errors are equal."""
     path = {
         str(name).replace("leader.", "planner."): value
         for name, value in read_scenario("formation-v").parameters.items()
         if str(name).startswith("leader.")
     }
     start = {"plant.eta0.x": -1.0, "plant.eta0.y": 1.0, "plant.eta0.z": 3.0}
-    alone = simulate("path", {**path, **start}, kind="native", stop_time=40.0)
-    together = simulate("formation-v", kind="native", stop_time=40.0)
+    alone = simulate("path", {**path, **start}, kind="native", stop_time=10.0)
+    together = simulate("formation-v", kind="native", stop_time=10.0)
     for axis in "xyz":
         name = f"plant.eta.{axis}"
         assert np.array_equal(alone[name], together[f"auv1.{name}"])
@@ -108,8 +99,8 @@ def test_the_first_place_has_the_errors_of_a_vehicle_alone():
     assert found == pytest.approx(alone.metrics()["final_error"], abs=1e-12)
 
 
-def test_places_in_a_v_are_those_of_geometry(fleets):
-    """Where the leader runs straight north, its V lies at 45 degrees to both sides."""
+def test_places_in_a_v_follow_geometry():
+    """The leader runs straight north: its V lies at 45 degrees to both sides."""
     proposed, _ = fleets("formation-v")
     row = int(np.searchsorted(proposed.time, 40.0))
     leader = proposed.group("leader.y_d", "xyz")[row]
@@ -120,19 +111,7 @@ def test_places_in_a_v_are_those_of_geometry(fleets):
 
 
 def test_loops_of_a_formation_are_found():
-    for name in ("formation-v", "formation-change", "formation-lost-link"):
-        loops = loops_of(load(name, "native"))
-        assert [loop.name for loop in loops] == list(VEHICLES)
-        assert [loop.planner for loop in loops] == [f"{name}.planner" for name in VEHICLES]
-        assert [loop.controller for loop in loops] == [f"{name}.controller" for name in VEHICLES]
-
-
-@pytest.mark.parametrize("scenario", ["formation-v", "formation-lost-link"])
-def test_both_kinds_make_the_same_formation(scenario, tmp_path):
-    tables = []
-    for kind in ("python", "native"):
-        folder = tmp_path / kind
-        options = ["--kind", kind, "--no-figures", "--stop-time", "8", "--out", str(folder)]
-        assert main(["run", scenario, *options]) == 0
-        tables.append((folder / "result.csv").read_bytes())
-    assert tables[0] == tables[1]
+    loops = loops_of(load("formation-lost-link", "native"))
+    assert [loop.name for loop in loops] == list(VEHICLES)
+    assert [loop.planner for loop in loops] == [f"{name}.planner" for name in VEHICLES]
+    assert [loop.controller for loop in loops] == [f"{name}.controller" for name in VEHICLES]

@@ -1,12 +1,10 @@
-"""`--kind`, `--fmi` and `--platforms`: the FMUs in C wherever a user meets those in Python."""
+"""`--kind`, `--fmi` and `--platforms`: FMUs in C in all commands."""
 
 from __future__ import annotations
 
-import hashlib
 import json
 import shutil
 import zipfile
-from importlib.util import find_spec
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -17,9 +15,7 @@ from fmpy.validation import validate_fmu
 from fmus.kinds import KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from support.machine import contents
 from support.settings import NAMES
-from support.texts import mentions
 
 SECOND = ["--stop-time", "1"]
 
@@ -33,30 +29,6 @@ def kinds(folder: Path) -> dict[str, str]:
     """The kind of each component of a run."""
     record = json.loads((folder / "run.json").read_text())
     return {name: fmu["kind"] for name, fmu in record["fmus"].items()}
-
-
-@pytest.mark.slow
-def test_build_writes_fmus_ssp_and_checksums(workplace, capsys):
-    assert main(["build", "--kind", "native"]) == 0
-    folder = workplace / "fmus/dist/native"
-    others = {"auv.ssp", "SHA256SUMS", "build.json"}
-    assert contents(folder).keys() == others | {f"{name}.fmu" for name in NAMES}
-    assert mentions(capsys.readouterr().out, "FMI 2.0 linux64")
-    for line in (folder / "SHA256SUMS").read_text().splitlines():
-        digest, name = line.split("  ")
-        assert hashlib.sha256((folder / name).read_bytes()).hexdigest() == digest
-    assert main(["build", "--kind", "native"]) == 0
-    assert "is up to date" in capsys.readouterr().out
-
-
-@pytest.mark.slow
-def test_kinds_take_each_others_place_in_a_folder(dist: Path, native: Path, workplace: Path):
-    shutil.copytree(native, workplace / "here")
-    assert main(["build", "--out", "here"]) == 0
-    assert main(["build", "--out", "there", "--kind", "native"]) == 0
-    for name in (*(f"{name}.fmu" for name in NAMES), "auv.ssp", "SHA256SUMS"):
-        assert (workplace / "here" / name).read_bytes() == (dist / name).read_bytes()
-        assert (workplace / "there" / name).read_bytes() == (native / name).read_bytes()
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -74,24 +46,16 @@ def test_fmu_is_valid_and_small_and_says_who_made_it(native: Path, name: str):
     assert [file.get("name") for file in implementation.iter("File")] == ["fmi2.c"]
 
 
-@pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
-def test_run_writes_the_same_table_to_the_bit(workplace: Path, order: str):
+def test_run_writes_the_same_table_to_the_bit(workplace: Path):
     for kind in KINDS:
-        options = [*SECOND, "--order", order, "--kind", kind, "--no-figures", "--out", kind]
-        assert main(["run", "fig4", *options]) == 0
+        options = ["--stop-time", "0.5", "--kind", kind, "--no-figures", "--out", kind]
+        assert main(["run", "fig5", *options]) == 0
     for name in ("result.csv", "metrics.json", "certificates.csv"):
         tables = [(workplace / kind / name).read_bytes() for kind in KINDS]
         assert tables[0] == tables[1]
-    assert {kind: {*kinds(workplace / kind).values()} for kind in KINDS} == {
-        "python": {"python"},
-        "native": {"native"},
-    }
-
-
-def test_companion_is_of_the_same_kind(workplace: Path):
-    assert main(["run", "fig5", "--kind", "native", *SECOND, "--no-figures", "--out", "out"]) == 0
-    for folder in (workplace / "out", workplace / "out/fig5-pd"):
-        assert {*kinds(folder).values()} == {"native"}
+    for kind in KINDS:
+        for folder in (workplace / kind, workplace / kind / "fig5-pd"):
+            assert {*kinds(folder).values()} == {kind}
 
 
 def test_fmus_of_a_file_are_as_they_are(dist: Path, workplace: Path):
@@ -106,34 +70,6 @@ def test_fmus_of_a_file_are_as_they_are(dist: Path, workplace: Path):
     }
     expected = simulate("fig4", stop_time=1.0, kind="python")
     assert np.array_equal(simulate("own.toml", stop_time=1.0, kind="native").rows, expected.rows)
-
-
-def test_systems_of_both_kinds_differ_in_their_files_alone():
-    python, native = (load("fig4", kind=kind) for kind in KINDS)
-    assert python.connections == native.connections
-    assert python.parameters == native.parameters
-    assert (python.stop_time, python.step) == (native.stop_time, native.step)
-    for name, component in python.components.items():
-        other = native.components[name]
-        assert component.fmu != other.fmu
-        for ours, theirs in zip(
-            component.description.modelVariables, other.description.modelVariables, strict=True
-        ):
-            for attribute in ("name", "valueReference", "type", "causality", "variability",
-                              "initial", "unit", "start", "min", "max", "description"):  # fmt: skip
-                assert getattr(ours, attribute) == getattr(theirs, attribute)
-        assert all(
-            component.has_feedthrough(v.name) == other.has_feedthrough(v.name)
-            for v in component.having("output")
-        )
-
-
-def test_loaded_system_can_be_run_saved_and_verified(workplace: Path, capsys):
-    system = load("fig4", kind="native")
-    folder = simulate(system, stop_time=1.0).save("saved")
-    assert {*kinds(folder).values()} == {"native"}
-    options = ["--tolerance", "0", "--scenario", "fig4"]
-    assert main(["verify", "saved/result.csv", *options]) == 0
 
 
 def test_export_with_fmi_3_is_an_ssp_2(workplace: Path):
@@ -157,9 +93,9 @@ def test_ssp_2_runs_as_ssp_1_does_bit_for_bit(workplace: Path):
         options = ["--kind", "native", "--fmi", fmi, "--out", fmi]
         assert main(["export", "fig4", *options]) == 0
         run = ["run", f"{fmi}/fig4.ssp", "--out", f"run{fmi}", "--no-figures"]
-        assert main([*run, "--stop-time", "5", "--columns", "all", "--strict"]) == 0
+        assert main([*run, "--stop-time", "1", "--columns", "all", "--strict"]) == 0
     tables = [Path(f"run{fmi}/result.csv").read_bytes() for fmi in "23"]
-    assert tables[0] == tables[1] and tables[0].count(b"\n") == 252
+    assert tables[0] == tables[1] and tables[0].count(b"\n") == 52
 
 
 @pytest.mark.parametrize("run", [lambda: load("fig4", "c"), lambda: simulate("fig4", kind="c")])
@@ -171,18 +107,3 @@ def test_unknown_kind_is_a_value_error(run):
 def test_system_keeps_the_fmus_it_was_loaded_with():
     with pytest.raises(ValueError, match="FMUs"):
         simulate(load("fig4"), kind="native")
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(find_spec("ziglang") is None, reason="ziglang is not installed")
-def test_one_archive_has_libraries_for_several_machines(native: Path, workplace: Path):
-    options = ["--kind", "native", "--platforms", "linux64,darwin64", "--out", "all"]
-    assert main(["build", *options]) == 0
-    for name in NAMES:
-        path = workplace / "all" / f"{name}.fmu"
-        assert validate_fmu(str(path)) == []
-        with zipfile.ZipFile(path) as archive, zipfile.ZipFile(native / path.name) as own:
-            libraries = {entry for entry in archive.namelist() if "binaries/" in entry}
-            same = set(own.namelist()) - {f"binaries/linux64/{name}.so"}
-            assert {e: archive.read(e) for e in same} == {e: own.read(e) for e in same}
-        assert libraries == {f"binaries/linux64/{name}.so", f"binaries/darwin64/{name}.dylib"}

@@ -1,22 +1,16 @@
-"""Both kinds of FMUs are one: the same rows to the bit, the same refusals at the same time."""
+"""Both kinds of FMUs have the same rows, bit for bit, and the same refusals."""
 
 from __future__ import annotations
 
-import os
-import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import auv_fmu
-import fmus
 from fmus.ports.port import Port
 from orchestrator.cosim import Experiment
-from orchestrator.runs.scenario import names, read_scenario
+from orchestrator.runs.scenario import read_scenario
 from support.instances import component
 from support.kinds import Outcome, difference, outcome
 from support.tiers import slow
@@ -48,7 +42,7 @@ def both(
     experiment: Experiment,
     values: dict[str, object] | None = None,
 ) -> Outcome:
-    """What a run comes to on either kind of FMUs."""
+    """The outcome of a run, which is the same on both kinds of FMUs."""
     ours, theirs = (
         outcome(folder, scenario, values or {}, experiment) for folder in (dist, native)
     )
@@ -56,33 +50,28 @@ def both(
     return ours
 
 
-@pytest.mark.parametrize("scenario", [name for name in names() if not read_scenario(name).events])
+@pytest.mark.parametrize("scenario", ["fig3b", "path", "sea", "remus-pd", "formation-lost-link"])
 def test_scenario_is_the_same(dist: Path, native: Path, scenario: str):
-    both(dist, native, scenario, Experiment(10.0, STEP))
+    both(dist, native, scenario, Experiment(2.0, STEP))
 
 
-@pytest.mark.parametrize("order", [Experiment.ORDERS[0], *slow(*Experiment.ORDERS[1:])])
-@pytest.mark.parametrize("scenario", ["fig4", *slow("fig5-pd", "formation-v")])
+@pytest.mark.parametrize(
+    ("scenario", "order"), [("fig4", "feedthrough"), *slow(("fig5-pd", "jacobi"))]
+)
 def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str, order: str):
     stop_time = read_scenario(scenario).stop_time
     assert stop_time is not None
     both(dist, native, scenario, Experiment(stop_time, STEP, order))
 
 
-@pytest.mark.parametrize("order", [Experiment.ORDERS[0], *slow(*Experiment.ORDERS[1:])])
 @pytest.mark.parametrize(
     ("scenario", "values"),
     [
-        ("fig4", {"controller.saturation": "algebraic"}),
-        ("fig5", {"controller.saturation": "algebraic"}),
-        ("fig4", {"controller.printed_jacobian": True}),
+        ("fig4", {"controller.saturation": "algebraic", "controller.innovation_gate": 0.0}),
+        ("fig5", {"controller.printed_jacobian": True, "controller.observer": "integral"}),
         ("fig5-pd", {"controller.printed_jacobian": True}),
-        ("fig4", {"controller.innovation_gate": 0.0}),
-        ("fig4", {"plant.noise.std": 0.0}),
         ("fig4", {"controller.saturation": "arctan", "controller.observer": "exact"}),
-        ("fig5", {"controller.observer": "integral"}),
-        ("fig5", {"plant.roll": False}),
-        ("fig5-pd", {"plant.roll": False, "plant.actuator.T.q": 0.1}),
+        ("fig5-pd", {"plant.roll": False, "plant.actuator.T.q": 0.1, "plant.noise.std": 0.0}),
         ("fig4", {"plant.current.x": 0.2, "plant.current.z": -0.1, "planner.nu0.u": 0.2}),
         ("fig5-pd", {"plant.actuator.T.u": 0.5, "plant.actuator.T.r": 0.001}),
         ("fig5", {"plant.integrator": "rk4", "plant.current.y": 0.1, "plant.actuator.T.r": 0.1}),
@@ -90,21 +79,23 @@ def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str
     ],
     ids=str,
 )
-def test_choices_are_the_same(dist: Path, native: Path, scenario, values, order):
-    assert both(dist, native, scenario, Experiment(10.0, STEP, order), values).failure is None
+def test_choices_are_the_same(dist: Path, native: Path, scenario, values):
+    for order, stop_time in zip(Experiment.ORDERS, (3.0, 0.5, 0.5), strict=True):
+        experiment = Experiment(stop_time, STEP, order)
+        assert both(dist, native, scenario, experiment, values).failure is None
 
 
-@pytest.mark.parametrize("seed", [-(2**31), -1, 0, 2, 2**31 - 1])
+@pytest.mark.parametrize("seed", [-(2**31), 0, 2**31 - 1])
 def test_noise_of_other_seeds_is_the_same(dist: Path, native: Path, seed: int):
     values = {"plant.noise.seed": seed, "plant.noise.std": 0.01}
-    both(dist, native, "fig4", Experiment(10.0, STEP), values)
+    both(dist, native, "fig4", Experiment(2.0, STEP), values)
 
 
 @each_controller
-@pytest.mark.parametrize("step", [0.001, 0.0137, 0.04, 0.1, 0.33])
+@pytest.mark.parametrize("step", [0.0137, 0.1, 0.33])
 def test_other_steps_are_the_same(dist: Path, native: Path, scenario: str, step: float):
     """Above 0.02 s, h_max, components split them."""
-    both(dist, native, scenario, Experiment(min(2000 * step, 20.0), step))
+    both(dist, native, scenario, Experiment(min(300 * step, 5.0), step))
 
 
 def varied(scenario: str) -> st.SearchStrategy[dict[str, float]]:
@@ -129,10 +120,10 @@ def scaled(port: Port, factor: float) -> float:
 
 @each_controller
 def test_runs_with_any_parameters_are_the_same(dist: Path, native: Path, scenario: str):
-    @settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
+    @settings(max_examples=25, suppress_health_check=[HealthCheck.too_slow])
     @given(varied(scenario), st.sampled_from([STEP, 0.05]))
     def hold(values: dict[str, float], step: float) -> None:
-        both(dist, native, scenario, Experiment(40 * step, step), dict(values))
+        both(dist, native, scenario, Experiment(20 * step, step), dict(values))
 
     hold()
 
@@ -140,14 +131,10 @@ def test_runs_with_any_parameters_are_the_same(dist: Path, native: Path, scenari
 #: Parameters that end in a refusal, and when [s]; None: before the first step.
 REFUSED = [
     ("fig4", {"plant.m11": 1e-9}, 0.1),
-    ("fig4", {"plant.righting.pitch": 1e12}, 0.18),
     ("fig4", {"controller.gamma": 1e6}, 1.5),
-    ("fig4", {"controller.sigma": 1e300}, 0.02),
     ("fig4", {"controller.lambda": 1e300}, None),
     ("fig4", {"disturbance.omega_d": 1e308}, 1.8),
     ("fig4", {"planner.righting.pitch": -1e3}, 1.34),
-    ("fig4", {"planner.d55": 1e5}, 0.08),
-    ("fig4", {"plant.ell": 1e200}, None),
     ("fig5-pd", {"controller.gamma": 1e200}, 0.0),
 ]
 
@@ -158,42 +145,3 @@ def test_refusals_are_the_same(dist: Path, native: Path, scenario, values, time)
     expected = "initialisation refused" if time is None else f"stopped at t = {time:g} s: "
     assert failure is not None
     assert expected in failure
-
-
-# One text for both
-
-
-def build(folder: Path, packages: Path, kind: str) -> Path:
-    """Build FMUs of a kind from the sources in a folder, in a process of its own."""
-    subprocess.run(
-        [sys.executable, "-m", "fmus.build", "--kind", kind, "--out", str(folder)],
-        env={**os.environ, "PYTHONPATH": str(packages)},
-        check=True, capture_output=True, cwd=packages,
-    )  # fmt: skip
-    return folder
-
-
-@pytest.mark.slow
-def test_constant_that_is_changed_in_one_equation_changes_both_kinds(dist, native, tmp_path):
-    packages = tmp_path / "packages"
-    for package in (auv_fmu, fmus):
-        [folder] = package.__path__
-        ignored = shutil.ignore_patterns("dist", "*.pyc")
-        shutil.copytree(folder, packages / package.__name__, ignore=ignored)
-    equations = packages / "auv_fmu/paper/disturbance.py"
-    text = equations.read_text()
-    assert text.count("A_f * sign(u)") == 1
-    equations.write_text(text.replace("A_f * sign(u)", "1.0000001 * A_f * sign(u)"))
-    runs = {
-        (kind, what): outcome(folder, "fig4", {}, Experiment(0.2, STEP))
-        for kind, what, folder in (
-            ("python", "as it is", dist),
-            ("native", "as it is", native),
-            ("python", "changed", build(tmp_path / "python", packages, "python")),
-            ("native", "changed", build(tmp_path / "native", packages, "native")),
-        )
-    }
-    assert difference(runs["python", "changed"], runs["native", "changed"]) == ""
-    for one, other in (("python", "native"), ("native", "python"), ("python", "python")):
-        found = difference(runs[one, "as it is"], runs[other, "changed"])
-        assert "tau_w.u at t = 0.02 s" in found

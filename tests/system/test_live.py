@@ -1,4 +1,4 @@
-"""`auv-fmu live`: the page's rows in Node and in a browser, beside the ones of the native FMUs."""
+"""`auv-fmu live`: the page's rows in Node and in a browser, compared with the native FMUs."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import zipfile
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,27 +33,28 @@ from orchestrator.vehicle.indices import metrics_of
 from support.browser import BROWSER, Browser, browser
 from support.events import ALL, ENDS
 from support.live import TOLERANCE, needs_npm, needs_zig
+from support.tiers import slow
 
 #: An installed package has no tests.
 SCRIPTS = Path(__file__).parents[2] / "orchestrator" / "live" / "web" / "test"
 
 pytestmark = [needs_npm, needs_zig]
 
-#: Until when [s] that is so where a run is chaotic: 100 m away, the robust term of the PD
-#: controller switches at every step.
+#: Last compared time [s] of a chaotic run: 100 m away, the robust term of the PD controller
+#: switches in every step.
 CHAOTIC = {"fig6-pd": 10.0}
 
-#: Tolerances where a run makes differences larger: two vehicles come back to their leader at once,
-#: with commands beyond their limits.
+#: Larger tolerances: two vehicles come back to their leader with commands beyond their limits.
 LARGER = {"formation-lost-link": 1e-5}
 
-#: Sine and its like, which differ between C libraries in the last bit.
+#: Sine and similar functions, which differ between C libraries in the last bit.
 SAME_FUNCTIONS = Path(__file__).parents[1] / "support" / "same_functions.h"
 
-#: Changes of settings, each from the ones before it: all scenarios, then events and a path in
-#: others, and other values.
+#: Scenarios with each kind of component and loop; `-m slow` runs the others.
+REPRESENTATIVES = ("fault-sensor", "fig3a", "fig6", "formation-lost-link", "remus", "sea")
+
+#: Changes of settings, each from the ones before it: events and a path in others, other values.
 CHANGES: list[dict[str, Any]] = [
-    *({"preset": name} for name in names()),
     {"preset": "path", "events": "fault-sensor", "planner.waypoint[2].z": 2.5},
     {"preset": "fig4", "events": "fault-thruster", "stop_time": 70.0, "plant.noise.seed": 7},
     {"events": "", "stop_time": 10.01, "controller.saturation": "algebraic", "plant.roll": False},
@@ -61,14 +63,14 @@ CHANGES: list[dict[str, Any]] = [
 
 
 class Parts(NamedTuple):
-    """What the page is made of, as files."""
+    """Parts of the page, as files."""
 
     engine: Path
     modules: list[Path]
     data: Path
 
     def node(self, script: str, *arguments: str, given: str = "") -> Any:
-        """What a script of the tests says, that takes them first."""
+        """Run a script of the tests, which takes the parts first, and return its output."""
         modules = ",".join(map(str, self.modules))
         parts = (str(self.engine), modules, str(self.data))
         command = ["node", str(SCRIPTS / script), *parts, *arguments]
@@ -85,7 +87,7 @@ def parts(script: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> 
 
 
 def made(engine: Path, opened: str, folder: Path, alone: bool = False) -> Parts:
-    """The parts of a page, with the scenario that it opens alone or with all."""
+    """The parts of a page, with all scenarios or only the one that it opens."""
     data, programs = page_data(opened)
     if alone:
         data["presets"] = [one for one in data["presets"] if one["name"] == data["opened"]]
@@ -94,18 +96,12 @@ def made(engine: Path, opened: str, folder: Path, alone: bool = False) -> Parts:
     return Parts(engine, modules, folder / "data.json")
 
 
-class Rows(NamedTuple):
-    """Rows of all loops in Node, and what else is said of them."""
-
-    folder: Path
-    said: dict[str, Any]
-
-
-@pytest.fixture(scope="module")
-def rows(parts: Parts, tmp_path_factory: pytest.TempPathFactory) -> Rows:
-    """The runs of all presets."""
-    folder = tmp_path_factory.mktemp("rows")
-    return Rows(folder, parts.node("rows.mjs", str(folder)))
+def rows_of(parts: Parts, name: str, folder: Path) -> dict[str, Any]:
+    """Run a preset in Node: its rows go into files of a folder."""
+    data = json.loads(parts.data.read_text())
+    data["presets"] = [one for one in data["presets"] if one["name"] == name]
+    (folder / "one.json").write_text(json.dumps(data))
+    return dict(parts._replace(data=folder / "one.json").node("rows.mjs", str(folder)))
 
 
 @pytest.fixture(scope="module")
@@ -118,37 +114,46 @@ def opened(page: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Bro
         yield found
 
 
-@pytest.mark.parametrize("name", names())
-def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, rows: Rows):
-    """Of a scenario and of what it is compared with."""
-    for i, run in enumerate(runs_of(name)):
-        table, said = Table(), rows.said[f"{name}.{i}"]
+@pytest.mark.parametrize(
+    "name", [*REPRESENTATIVES, *slow(*(name for name in names() if name not in REPRESENTATIVES))]
+)
+def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, parts: Parts, tmp_path):
+    """For a scenario and its companion."""
+    outcomes = rows_of(parts, name, tmp_path)
+    for i, run in enumerate(map(compiled, runs_of(name))):
+        table, outcome = Table(), outcomes[f"{name}.{i}"]
         ending = run.run([table])
-        assert said["columns"] == [table.columns[i - 1] for i in places(table)[1:]]
-        assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
-        assert (tuple(said["messages"]), said.get("failure")) == (ending.messages, ending.failure)
+        assert outcome["columns"] == [table.columns[i - 1] for i in places(table)[1:]]
+        assert [tuple(one.values()) for one in outcome["happened"]] == [*ending.events]
+        assert tuple(outcome["messages"]) == ending.messages
+        assert outcome.get("failure") == ending.failure
         wanted = table.rows[:, places(table)]
-        found = np.fromfile(rows.folder / f"{name}.{i}").reshape(wanted.shape)
-        until = CHAOTIC.get(run.scenario.name, np.inf)
-        looked_at = table.time <= until
+        found = np.fromfile(tmp_path / f"{name}.{i}").reshape(wanted.shape)
+        compared = table.time <= CHAOTIC.get(run.scenario.name, np.inf)
         difference = np.abs(found - wanted) / np.maximum(1.0, np.abs(wanted))
-        tolerance = LARGER.get(run.scenario.name, TOLERANCE)
-        assert difference[looked_at].max() <= tolerance
-        compare_indices(run, table, found, said, OF_SINES)
+        assert difference[compared].max() <= LARGER.get(run.scenario.name, TOLERANCE)
+        compare_indices(run, table, found, outcome, OF_SINES)
 
 
-#: Indices that sines and the like go into.
+def compiled(run: Prepared) -> Prepared:
+    """The run in the compiled loop, which is faster."""
+    return replace(run, plan=replace(run.plan, loop="compiled"))
+
+
+#: Indices that depend on such functions.
 OF_SINES = ("final_error",)
 
 
-def compare_indices(run: Prepared, table: Table, found: np.ndarray, said: Any, near: Sequence[str]):
+def compare_indices(
+    run: Prepared, table: Table, found: np.ndarray, outcome: Any, near: Sequence[str]
+):
     """Compare the indices of rows in Node with those that the master has of the same rows.
 
     Args:
         run: that was made.
         table: of the master.
         found: the rows in Node.
-        said: of them.
+        outcome: of them.
         near: the indices that need not be the same bit for bit.
 
     """
@@ -157,7 +162,7 @@ def compare_indices(run: Prepared, table: Table, found: np.ndarray, said: Any, n
     metrics = metrics_of(Table.of(table.header, rows), run.loops)
     together = {name: [value] for name, value in metrics.together.items()}
     assert len(together) == (len(run.loops) > 1)
-    for loop, measured in zip(run.loops, said["metrics"], strict=True):
+    for loop, measured in zip(run.loops, outcome["metrics"], strict=True):
         wanted = metrics.found(loop) | together
         assert measured.keys() == wanted.keys()
         for index, values in wanted.items():
@@ -166,36 +171,39 @@ def compare_indices(run: Prepared, table: Table, found: np.ndarray, said: Any, n
 
 
 def places(table: Table) -> list[int]:
-    """Where a row has what a program has, too: all but whether an FMU fails."""
+    """Columns that a program has, too: all except `fault`."""
     return [0, *(i for i, name in enumerate(table.columns, 1) if not name.endswith(".fault"))]
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
-def test_only_the_c_library_makes_rows_differ(rows: Rows, parts: Parts, tmp_path, monkeypatch):
-    """With the same sine and its like in both, all rows and indices are the same bit for bit."""
+def test_only_the_c_library_makes_rows_differ(parts: Parts, tmp_path, monkeypatch):
+    """With the same functions in both, all rows and indices are equal bit for bit."""
     with monkeypatch.context() as patch:
         patch.setattr(module, "_FLAGS", (*module._FLAGS, "-include", str(SAME_FUNCTIONS)))
         content = module.compiled(presets.bundled().sources)[module.MODULE]
     (tmp_path / "same.wasm").write_bytes(content)
-    said = parts._replace(modules=[tmp_path / "same.wasm"]).node("rows.mjs", str(tmp_path))
+    rows_of(parts, "sea", tmp_path)
+    other_rows = (tmp_path / "sea.0").read_bytes()
+    same = parts._replace(modules=[tmp_path / "same.wasm"])
     fmus = with_same_functions(bundle.current_fmus(NATIVE), tmp_path)
     options = (*reduction._OPTIONS, "-include", str(SAME_FUNCTIONS))
     monkeypatch.setattr(reduction, "_OPTIONS", options)
     reduction.library_of.cache_clear()
     monkeypatch.setattr("orchestrator.runs.preparation.current_fmus", lambda *_: fmus)
-    for name in names():
-        for i, run in enumerate(presets.runs_of(name)):
-            table = Table()
+    for name in REPRESENTATIVES:
+        outcomes = rows_of(same, name, tmp_path)
+        for i, run in enumerate(map(compiled, runs_of(name))):
+            table, outcome = Table(), outcomes[f"{name}.{i}"]
             ending = run.run([table])
             wanted = table.rows[:, places(table)]
             found = np.fromfile(tmp_path / f"{name}.{i}").reshape(wanted.shape)
             assert found.tobytes() == wanted.tobytes(), (name, i)
-            assert said[f"{name}.{i}"].get("failure") == ending.failure
-            compare_indices(run, table, found, said[f"{name}.{i}"], ())
+            assert outcome.get("failure") == ending.failure
+            compare_indices(run, table, found, outcome, ())
     reduction.library_of.cache_clear()
-    # They are not the rows of any C library.
-    assert (tmp_path / "fig4.0").read_bytes() != (rows.folder / "fig4.0").read_bytes()
+    # Another C library gives other rows.
+    assert (tmp_path / "sea.0").read_bytes() != other_rows
 
 
 def with_same_functions(folder: Path, place: Path) -> Path:
@@ -215,84 +223,73 @@ def with_same_functions(folder: Path, place: Path) -> Path:
     return made
 
 
-@pytest.mark.parametrize(
-    ("last", "end"),
-    [("whole", 20.0), ("chattering", 20.0), ("stopped", 18.0), ("refused", 18.0)],
-)
-def test_events_of_all_kinds_do_what_they_do_in_the_master(last, end, parts: Parts, tmp_path):
-    said, run = both(ALL.replace("LAST", ENDS[last]), parts, tmp_path)
-    ending, table = compare(run, said, tmp_path)
-    assert table.time[-1] == pytest.approx(end)
-    assert [tuple(one.values()) for one in said["happened"]] == [*ending.events]
+def test_events_of_all_kinds_do_what_they_do_in_the_master(parts: Parts, tmp_path):
+    last = ENDS["chattering"] + ENDS["refused"]
+    outcome, run = both(ALL.replace("LAST", last), parts, tmp_path)
+    ending, table = compare(run, outcome, tmp_path)
+    assert table.time[-1] == pytest.approx(18.0)
+    assert [tuple(one.values()) for one in outcome["happened"]] == [*ending.events]
     assert len(ending.events) > 12
-    assert said.get("remark") == ending.remark
-    if ending.failure is None:
-        assert "failure" not in said
-    else:
-        assert said["failure"] == "stopped at t = 18 s: plant refused its step"
-        assert ending.failure.startswith("stopped at t = 18 s: plant: ")
+    assert outcome["failure"] == "stopped at t = 18 s: plant refused its step"
+    assert str(ending.failure).startswith("stopped at t = 18 s: plant: ")
 
 
 def test_vehicles_have_any_names_and_may_have_no_controller(parts: Parts, tmp_path):
-    said, run = both('stop_time = 5.0\n[components]\ntow = "AuvPlant"\n', parts, tmp_path)
-    compare(run, said, tmp_path)
-    one, other = said["metrics"]
+    outcome, run = both('stop_time = 5.0\n[components]\ntow = "AuvPlant"\n', parts, tmp_path)
+    compare(run, outcome, tmp_path)
+    one, other = outcome["metrics"]
     assert one.keys() - other.keys() == {"final_error"}
     assert other["peak_command"] == [0.0, 0.0, 0.0]
 
 
 def both(text: str, parts: Parts, folder: Path) -> tuple[Any, Prepared]:
-    """What a scenario's run in Node says, and the run itself."""
+    """Run a scenario in Node, and prepare it for the master."""
     scenario = folder / "mine.toml"
     scenario.write_text(text)
-    said = made(parts.engine, str(scenario), folder, alone=True).node("rows.mjs", str(folder))
-    return said["mine.0"], runs_of(str(scenario))[0]
+    outcome = made(parts.engine, str(scenario), folder, alone=True).node("rows.mjs", str(folder))
+    return outcome["mine.0"], runs_of(str(scenario))[0]
 
 
-def compare(run: Prepared, said: Any, folder: Path) -> tuple[Ending, Table]:
+def compare(run: Prepared, outcome: Any, folder: Path) -> tuple[Ending, Table]:
     """Compare rows and indices of a scenario's run in Node with the run itself."""
     table = Table()
     ending = run.run([table])
     wanted = table.rows[:, places(table)]
     found = np.fromfile(folder / "mine.0").reshape(wanted.shape)
     assert found == pytest.approx(wanted, rel=TOLERANCE, abs=TOLERANCE)
-    compare_indices(run, table, found, said, OF_SINES)
+    compare_indices(run, table, found, outcome, OF_SINES)
     return ending, table
 
 
 def test_a_state_that_a_guard_starts_over_is_told(parts: Parts, tmp_path):
-    """Of an observer that restarts; what an FMU says again after a reset is not."""
+    """An observer restarts."""
     gate = "stop_time = 2.0\n[parameters]\ncontroller.innovation_gate = 1e-6\n"
-    said, run = both(gate, parts, tmp_path)
+    outcome, run = both(gate, parts, tmp_path)
     [message] = run.run([]).messages
-    assert said["messages"] == [message]
+    assert outcome["messages"] == [message]
 
 
-#: Scenarios with what only programs of their own have.
-OTHERS = {
-    "slow": "stop_time = 5.0\n[steps]\ncontroller = 0.04\nplanner = 0.1\n",
-    "slow, in another order": (
-        'stop_time = 5.0\norder = "gauss-seidel"\n[steps]\ncontroller = 0.04\n'
-    ),
-    "own": 'stop_time = 5.0\n[components]\ncontroller = "law/MyLaw.fmu"\n',
-}
-
-
-@pytest.mark.parametrize("text", OTHERS.values(), ids=OTHERS)
-def test_systems_of_a_users_own_run_in_the_page(text, parts: Parts, tmp_path):
-    if "MyLaw" in text:
-        new_controller("my_law", tmp_path / "law")
-    said, run = both(text, parts, tmp_path)
-    ending, _ = compare(run, said, tmp_path)
-    assert said.get("failure") == ending.failure is None
+def test_systems_of_a_users_own_run_in_the_page(parts: Parts, tmp_path):
+    """With a component, an order and longer steps of its own; shorter steps are refused."""
+    new_controller("my_law", tmp_path / "law")
+    text = 'stop_time = 5.0\norder = "gauss-seidel"\n[steps]\ncontroller = 0.04\nplanner = 0.1\n'
+    text += '[components]\ncontroller = "law/MyLaw.fmu"\n'
+    outcome, run = both(text, parts, tmp_path)
+    ending, _ = compare(run, outcome, tmp_path)
+    assert outcome.get("failure") == ending.failure is None
+    mine = made(parts.engine, str(tmp_path / "mine.toml"), tmp_path, alone=True)
+    [refused] = mine.node("tables.mjs", given=json.dumps([{"step": 0.01}]))
+    assert refused["refusal"] == (
+        "step 0.01 s: a component takes longer steps, which are multiples of 0.02 s"
+    )
 
 
 def test_a_component_outside_the_language_is_refused_in_one_line(tmp_path, capsys):
     new_controller("other_law", tmp_path / "law", python=True)
     assert main(["live", str(tmp_path / "law" / "other_law.toml")]) == 2
     error = capsys.readouterr().err
-    told = "other_law: the live page cannot run controller: OtherLaw.fmu is not a component"
-    assert told in error
+    refusal = "other_law: the live page cannot run controller: OtherLaw.fmu is not a component"
+    assert refusal in error
     assert error.count("\n") == 1
     new_controller("bad_law", tmp_path / "bad")
     script = tmp_path / "bad" / "bad_law.py"
@@ -306,17 +303,8 @@ def test_a_component_outside_the_language_is_refused_in_one_line(tmp_path, capsy
     assert error.count("\n") == 1
 
 
-def test_a_step_that_a_program_cannot_make_is_refused(parts: Parts, tmp_path):
-    (tmp_path / "mine.toml").write_text("[steps]\ncontroller = 0.04\n")
-    mine = made(parts.engine, str(tmp_path / "mine.toml"), tmp_path)
-    [refused] = mine.node("tables.mjs", given=json.dumps([{"step": 0.01}]))
-    assert refused["refusal"] == (
-        "step 0.01 s: a component takes longer steps, which are multiples of 0.02 s"
-    )
-
-
 def test_tables_are_the_same_in_node_and_in_a_browser(parts: Parts, opened: Browser):
-    """Bit for bit, for all scenarios, events in others, and other values."""
+    """Bit for bit."""
     wanted = parts.node("tables.mjs", given=json.dumps(CHANGES))
     for changes, one in zip(CHANGES, wanted, strict=True):
         digest = opened.evaluate(f"""(async () => {{
@@ -354,7 +342,6 @@ def test_refusal_is_the_line_of_the_fmu_and_changes_nothing(parts: Parts):
     ("preset", "events", "changes"),
     [
         ("fig4", [], {"controller.k_d": 25.0, "plant.noise.seed": 3}),
-        ("fig5-pd", [], {"plant.ell": 0.4}),
         ("fault-thruster", ["--events", "fault-thruster"], {"controller.eps_t": 5.0}),
     ],
 )
@@ -398,7 +385,7 @@ def test_page_has_the_licence_of_each_thing_in_it(page: Path):
 
 
 def test_page_opens_a_file_of_the_users(tmp_path, opened: Browser):
-    """With events of its own, which the scenarios of the list can have as well."""
+    """With events of its own, which the scenarios of the list can also have."""
     scenario = tmp_path / "mine.toml"
     scenario.write_text(
         'title = "Mine <b>"\n[parameters]\nplant.noise.std = 0.0\n[[events]]\nat = 0.2\n'
@@ -412,17 +399,12 @@ def test_page_opens_a_file_of_the_users(tmp_path, opened: Browser):
     assert len(table) == 1 + 11
 
 
-def test_loops_with_the_same_controller_are_told_apart_by_their_scenarios(tmp_path):
+def test_loops_are_told_apart_by_their_scenarios_and_drawn_in_one_order(tmp_path):
+    """If both have the same controller; and in the same order whichever a scenario has."""
     (tmp_path / "mine.toml").write_text('compare = { name = "fig4" }\n')
-    assert [one["label"] for one in preset(str(tmp_path / "mine.toml"))[0]["loops"]] == [
-        "mine",
-        "fig4",
-    ]
-
-
-def test_controllers_are_drawn_in_the_same_order_whichever_a_scenario_has():
-    assert preset("fig5")[0]["drawn"] == [0, 1]
-    assert preset("fig5-pd")[0]["drawn"] == [1, 0]
+    loops = preset(str(tmp_path / "mine.toml"))[0]["loops"]
+    assert [one["label"] for one in loops] == ["mine", "fig4"]
+    assert (preset("fig5")[0]["drawn"], preset("fig5-pd")[0]["drawn"]) == ([0, 1], [1, 0])
 
 
 def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
@@ -449,7 +431,7 @@ def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
         ("vehicles = 2\nstop_time = 2001.0\n", "more than 100,000 steps"),
     ],
 )
-def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, capsys):
+def test_scenarios_that_the_page_cannot_run_are_refused_in_one_line(text, why, tmp_path, capsys):
     (tmp_path / "mine.toml").write_text(text)
     assert main(["live", str(tmp_path / "mine.toml"), "--out", str(tmp_path / "page.html")]) == 2
     error = capsys.readouterr().err
@@ -469,7 +451,7 @@ def test_what_the_page_cannot_run_is_refused_in_one_line(text, why, tmp_path, ca
         (assembly.bundled, "assembly.shutil.which", "Node.js"),
     ],
 )
-def test_what_makes_a_part_is_named_where_it_is_missing(
+def test_missing_tools_of_the_page_are_named(
     make: Callable[[], object], lacking, wanted, monkeypatch
 ):
     monkeypatch.setattr(f"orchestrator.live.{lacking}", lambda *_: None)

@@ -17,7 +17,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     for name, std in (("noisy", "0.001"), ("quiet", "0")):
         out = str(folder / name)
-        arguments = ["run", "fig4", "--stop-time", "4", "--set", f"plant.noise.std={std}"]
+        arguments = ["run", "fig4", "--stop-time", "1", "--set", f"plant.noise.std={std}"]
         assert main([*arguments, "--no-figures", "--out", out]) == 0
     return folder
 
@@ -35,7 +35,7 @@ def test_plot_draws_results_over_each_other(results, tmp_path, monkeypatch, caps
 
 
 def test_record_that_does_not_name_a_table_is_not_its_record(results, tmp_path):
-    """Another table beside the record: nothing is known of its parameters."""
+    """Parameters of another table next to the record are unknown."""
     for name in ("result.csv", "other.csv"):
         (tmp_path / name).write_bytes((results / "quiet" / "result.csv").read_bytes())
     (tmp_path / "run.json").write_bytes((results / "quiet" / "run.json").read_bytes())
@@ -46,17 +46,10 @@ def test_record_that_does_not_name_a_table_is_not_its_record(results, tmp_path):
 
 
 def test_animation_is_written_with_step_and_order(tmp_path):
-    out = tmp_path / "films" / "fig4.gif"
-    arguments = ["animate", "fig4", "--stop-time", "1", "--step", "0.01", "--order", "jacobi"]
-    assert main([*arguments, "--fps", "2", "--out", str(out)]) == 0
-    assert out.read_bytes().startswith(b"GIF89a")
-    assert contents(out.parent).keys() == {"fig4.gif"}
-
-
-def test_vehicles_of_a_run_are_in_one_film(tmp_path):
-    scenario = tmp_path / "three.toml"
+    """One film shows all vehicles."""
+    scenario, film = tmp_path / "three.toml", tmp_path / "films" / "three.gif"
     scenario.write_text("vehicles = 3\nstop_time = 1.0\n", encoding="utf-8")
-    film = tmp_path / "film" / "three.gif"
-    sizes = ["--fps", "1", "--size", "300x200", "--speed", "0.5"]
-    assert main(["animate", str(scenario), *sizes, "--out", str(film)]) == 0
-    assert contents(tmp_path / "film").keys() == {"three.gif"}
+    options = ["--step", "0.01", "--order", "jacobi", "--fps", "1", "--size", "300x200"]
+    assert main(["animate", str(scenario), *options, "--out", str(film)]) == 0
+    assert film.read_bytes().startswith(b"GIF89a")
+    assert contents(film.parent).keys() == {"three.gif"}

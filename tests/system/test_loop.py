@@ -1,9 +1,8 @@
-"""The compiled loop does what the Python loop does, bit for bit and word for word."""
+"""The compiled loop has the rows and messages of the Python loop."""
 
 from __future__ import annotations
 
 import errno
-import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,8 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fmus.kinds import NATIVE
-from orchestrator.commands.main import main
 from orchestrator.cosim import (
     Alter,
     Event,
@@ -24,16 +21,12 @@ from orchestrator.cosim import (
     Isolation,
     Linear,
     PortName,
-    Run,
     System,
     Table,
     make_plan,
     simulate_plan,
 )
-from orchestrator.cosim.fmi.instance import Ended
-from orchestrator.cosim.hooks import NEVER
 from orchestrator.machine.errors import StartError
-from orchestrator.runs.preparation import load
 from orchestrator.runs.wiring import closed_loop
 from support.machine import LOOPS
 from support.mixed import ACTS, CALLS, Shape, altered, system_of, systems
@@ -43,7 +36,7 @@ from support.texts import mentions
 #: Step [s].
 H = 0.5
 
-#: Orders that any system can be run in; None: the first, or the second where its FMUs want that.
+#: Orders for any system; None: feedthrough, or Gauss-Seidel if its FMUs need that.
 ANY = (None, "gauss-seidel", "jacobi")
 
 ISOLATED = pytest.param({"loop": "python", "isolation": Isolation(20.0)}, marks=pytest.mark.slow)
@@ -69,7 +62,7 @@ def run(
 
 
 def same(system: System, experiment: Experiment, events: Sequence[Event] = ()) -> Table:
-    """What both loops make of a run."""
+    """A run, which is the same in both loops."""
     python, compiled = (run(system, experiment, loop, events) for loop in LOOPS)
     assert compiled.rows.tobytes() == python.rows.tobytes()
     assert compiled.ending == python.ending
@@ -77,7 +70,7 @@ def same(system: System, experiment: Experiment, events: Sequence[Event] = ()) -
     return python
 
 
-@settings(max_examples=60)
+@settings(max_examples=30)
 @given(
     arguments=systems(),
     step=st.floats(1e-3, 1.0),
@@ -93,7 +86,7 @@ def test_random_systems_give_the_same_rows_and_the_same_failures(
         same(system_of(folder, **arguments), Experiment((n + rest) * step, step, order))
 
 
-@settings(max_examples=100)
+@settings(max_examples=40)
 @given(data=st.data(), arguments=systems(), order=st.sampled_from(ANY))
 def test_values_of_any_size_on_their_ways_give_the_same_rows_and_the_same_failures(
     folder, data, arguments, order
@@ -110,12 +103,11 @@ def test_values_of_any_size_on_their_ways_give_the_same_rows_and_the_same_failur
 
 
 @pytest.mark.parametrize("order", ANY)
-@pytest.mark.parametrize("step", [0.02, 0.03])
-def test_the_bundle_gives_the_same_rows(dist: Path, order: str, step: float):
-    assert len(same(closed_loop(dist), Experiment(20.0, step, order))) > 600
+def test_the_bundle_gives_the_same_rows(dist: Path, order: str):
+    assert len(same(closed_loop(dist), Experiment(5.0, 0.03, order))) > 160
 
 
-#: A component that feeds another one, by which it is fed.
+#: Two components that feed each other.
 PAIR = {
     "shapes": {name: Shape((1, 0, 0, 1), (1, 1, 0, 1)) for name in ("bad", "good")},
     "connections": {
@@ -127,7 +119,7 @@ PAIR = {
 
 
 def pair(folder: Path, act: str, call: str = "STEP", milliseconds: int = 0) -> System:
-    """The two, of which the first misbehaves in its seventh step."""
+    """The two; the first misbehaves in its seventh step."""
     values = {"act": ACTS[act], "call": CALLS[call], "at": 7, "milliseconds": milliseconds}
     return system_of(folder, **PAIR, parameters={f"bad.{k}": v for k, v in values.items()})
 
@@ -137,21 +129,12 @@ def pair(folder: Path, act: str, call: str = "STEP", milliseconds: int = 0) -> S
     ("act", "call", "rows", "words"),
     [
         ("DISCARD", "SET", 8, "3.5 s: bad: inputs 2 discard"),
-        ("DISCARD", "STEP", 7, "3 s: bad: doStep 2 discard"),
         ("DISCARD", "GET", 7, "3 s: bad: outputs 2 discard"),
         ("FAIL", "STEP", 7, "3 s: bad: doStep 3 error"),
-        *(
-            (act, call, rows, f"{name} {status} illegal")
-            for act, status in (("BELOW_ALL", -1), ("BEYOND_ALL", 6))
-            for call, rows, name in (
-                ("SET", 8, "3.5 s: bad: inputs"),
-                ("STEP", 7, "3 s: bad: doStep"),
-                ("GET", 7, "3 s: bad: outputs"),
-            )
-        ),
-        ("FATAL", "SET", 8, "3.5 s: bad: inputs 4 fatal"),
+        ("BELOW_ALL", "SET", 8, "3.5 s: bad: inputs -1 illegal"),
+        ("BEYOND_ALL", "STEP", 7, "3 s: bad: doStep 6 illegal"),
+        ("BEYOND_ALL", "GET", 7, "3 s: bad: outputs 6 illegal"),
         ("FATAL", "STEP", 7, "3 s: bad: doStep 4 fatal"),
-        ("FATAL", "GET", 7, "3 s: bad: outputs 4 fatal"),
         ("SAYS", "STEP", 7, "3 s: bad: tired"),
         ("NOT_A_NUMBER", "STEP", 7, "3.5 s: bad.output.Real0 nan"),
         ("INFINITE", "STEP", 7, "3.5 s: bad.output.Real0 inf"),
@@ -166,7 +149,7 @@ def test_a_step_that_fails_is_named_and_the_rows_before_it_kept(
     assert table.ending.messages == (("bad: step 7", "bad: tired") if act == "SAYS" else ())
 
 
-#: Of the first an Integer and a Real feed the second, whose outputs are finite whatever it takes.
+#: An Integer and a Real of the first feed the second, whose outputs are finite for any inputs.
 FED = {
     "shapes": {"a": Shape((1, 0, 0, 0), (1, 1, 0, 0)), "b": Shape((1, 1, 0, 0), (0, 1, 0, 0))},
     "connections": {"b.input.Real0": "a.output.Real0", "b.input.Integer0": "a.output.Integer0"},
@@ -202,8 +185,8 @@ def test_an_input_that_its_type_cannot_hold_ends_the_run(
     assert mentions(table.failure, words)
     assert np.isfinite(table.rows).all()
     assert table.failure.startswith(f"stopped at t = {len(table) * H:g} s: ")
-    # The row that shows it is that of its time, or that of the end of the step; that an integer
-    # is too large is seen where it is set, after the row.
+    # The row of its time, or of the end of the step, shows it; an integer is too large when it is
+    # set, after the row.
     at_once = order == "feedthrough" and "Integer" not in words
     assert len(table) == 7 - at_once if target else 7 < len(table) < 400
 
@@ -212,7 +195,7 @@ def test_an_input_that_its_type_cannot_hold_ends_the_run(
 @pytest.mark.parametrize("order", Experiment.ORDERS)
 @pytest.mark.parametrize("act", ["ROUNDS", "FLUSHES"])
 def test_the_mode_of_an_fmu_changes_no_number_of_the_others(folder, loop, order, act):
-    """It takes it on when its outputs are asked for, which it only copies."""
+    """The FMU changes the floating-point mode in the call that gets its outputs."""
     there = replace(pair(folder, act, "GET"), connections=())
     wires = [
         replace(connection, transformation=Linear(0.1, 1e-3))
@@ -221,20 +204,15 @@ def test_the_mode_of_an_fmu_changes_no_number_of_the_others(folder, loop, order,
     ]
     there = replace(there, connections=tuple(wires))
     behaves = there.with_parameters({PortName("bad", "act"): ACTS["BEHAVE"]})
-    experiment = Experiment(100.0, 0.1, order)
+    experiment = Experiment(10.0, 0.1, order)
     found, expected = (run(system, experiment, loop) for system in (there, behaves))
     assert found.rows.tobytes() == expected.rows.tobytes()
-    assert len(found) == 1001
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-def test_a_warning_is_no_failure(folder, loop):
-    assert len(run(pair(folder, "WARN"), Experiment(100.0, H), loop)) == 201
+    assert len(found) == 101
 
 
 @pytest.mark.parametrize("loop", LOOPS)
 def test_an_interrupt_ends_a_run_of_slow_steps_soon(folder, loop):
-    """It comes in the seventh step; each takes longer than a look may be away."""
+    """The signal comes in the seventh step."""
     system = pair(folder, "INTERRUPT", milliseconds=40)
     table = run(system, Experiment(100.0, H), loop)
     assert 8 <= len(table) <= 9
@@ -245,19 +223,19 @@ def test_an_interrupt_ends_a_run_of_slow_steps_soon(folder, loop):
 
 @pytest.mark.parametrize("loop", LOOPS)
 def test_observers_of_slow_steps_are_told_meanwhile(folder, loop):
-    """Steps of 40 ms: at least every eighth."""
-    told = []
+    """Steps of 40 ms: at least every eighth. Warnings do not end the run."""
+    counts = []
 
     class Counts(Table):
         def take(self, rows: np.ndarray) -> None:
             super().take(rows)
-            told.append(len(rows))
+            counts.append(len(rows))
 
     table, experiment = Counts(), Experiment(10.0, H)
-    system = pair(folder, "BEHAVE", milliseconds=40)
+    system = pair(folder, "WARN", milliseconds=40)
     simulate_plan(make_plan(system, experiment, loop=loop), [table])
     assert len(table) == 21
-    assert max(told) <= 8
+    assert max(counts) <= 8
 
 
 @pytest.mark.parametrize("loop", LOOPS)
@@ -277,47 +255,3 @@ def test_rows_that_cannot_be_kept_end_a_run(folder, loop):
     )
     assert 1000 < len(full) < len(whole) < 2001
     assert np.array_equal(whole.time, np.arange(len(whole)) * H)
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-def test_the_record_says_which_loop_has_run(workplace, loop):
-    options = ["--stop-time", "0.1", "--no-figures", "--out", "r", "--loop", loop]
-    assert main(["run", "fig4", *options]) == 0
-    assert json.loads(Path("r/run.json").read_text())["loop"] == loop
-
-
-class Pushes:
-    """Surge force of zero from one time to another, and the end of the run at a third [steps]."""
-
-    def __init__(self, begin: int, end: int, stop: int = NEVER) -> None:
-        self._acts = {begin: self._begin, end: self._end, stop: self._stop}
-        self.times: list[int] = []
-
-    def act(self, run: Run) -> int:
-        self.times.append(run.made)
-        if act := self._acts.pop(run.made, None):
-            act(run)
-        return min(self._acts, default=NEVER)
-
-    def _begin(self, run: Run) -> None:
-        run.overrides.override(PortName.read("plant.tau.u"), 0.0)
-
-    def _end(self, run: Run) -> None:
-        run.overrides.release(PortName.read("plant.tau.u"))
-
-    def _stop(self, run: Run) -> None:
-        raise Ended("enough")
-
-
-@pytest.mark.parametrize("loop", LOOPS)
-@pytest.mark.parametrize("order", Experiment.ORDERS)
-def test_a_hook_acts_on_the_steps_that_it_names(loop, order):
-    pushes = Pushes(10, 620, 650)
-    table = run_table(load("fig4", NATIVE), Experiment(14.0, 0.02, order), loop, hooks=[pushes])
-    assert pushes.times == [0, 10, 620, 650]
-    assert (table.failure, table.ending.remark) == (None, "ended at t = 13 s: enough")
-    assert len(table) == 651
-    force, command = table.step_values("plant.tau.u", "controller.tau.u").T
-    free = np.r_[1:10, 620:650]
-    np.testing.assert_array_equal(force[10:620], 0.0)
-    np.testing.assert_array_equal(force[free], command[free - (order == "jacobi")])

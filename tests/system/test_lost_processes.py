@@ -1,4 +1,4 @@
-"""A study whose processes are killed comes to the table of one that was left in peace."""
+"""A study whose processes are killed has the same table as an undisturbed one."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ seed = 7
 
 
 def sweep(out):
-    """A sweep of its own, which nothing of this process reaches."""
+    """A sweep in a session of its own."""
     means = ("--kind", "native", "--workers", "2", "--out", out)
     return subprocess.Popen(
         [sys.executable, "-m", "orchestrator", "sweep", "study.toml", *means],
@@ -48,10 +48,10 @@ def sweep(out):
 
 
 def rows(out):
-    """How many runs are kept; the process that keeps them lets nobody else read."""
+    """Number of kept runs, from a copy: the process that keeps them locks the file."""
     with TemporaryDirectory() as copy:
         for file in out.glob(f"{DATABASE}*"):
-            # It may be gone meanwhile.
+            # It may have been removed.
             with suppress(FileNotFoundError):
                 shutil.copy(file, copy)
         with closing(sqlite3.connect(Path(copy, DATABASE))) as database:
@@ -62,7 +62,7 @@ def rows(out):
 
 
 def in_the_middle(process, out):
-    """When some more runs are kept than before, and some are under way; how many."""
+    """Wait until some more runs are kept, and return their number."""
     before = rows(out)
     while (kept := rows(out)) <= before + 2:
         assert process.poll() is None, process.communicate()
@@ -80,8 +80,8 @@ def worker(process):
 def test_killed_twice_interrupted_once_and_short_of_a_worker(workplace):
     (workplace / "study.toml").write_text(STUDY)
     peace = sweep("peace")
-    _, said = peace.communicate(timeout=300)
-    assert peace.returncode == 0, said
+    _, errors = peace.communicate(timeout=300)
+    assert peace.returncode == 0, errors
 
     out = workplace / "trouble"
     for end in (signal.SIGKILL, signal.SIGINT, signal.SIGKILL):
@@ -89,14 +89,14 @@ def test_killed_twice_interrupted_once_and_short_of_a_worker(workplace):
         kept = in_the_middle(process, out)
         # Ctrl-C reaches every process of a terminal.
         (os.killpg if end == signal.SIGINT else os.kill)(process.pid, end)
-        _, said = process.communicate(timeout=60)
-        assert process.returncode == (130 if end == signal.SIGINT else -end), said
+        _, errors = process.communicate(timeout=60)
+        assert process.returncode == (130 if end == signal.SIGINT else -end), errors
         assert kept <= rows(out) < RUNS
     process = sweep("trouble")
     in_the_middle(process, out)
     worker(process).kill()
-    _, said = process.communicate(timeout=300)
-    assert (process.returncode, said) == (0, "")
+    _, errors = process.communicate(timeout=300)
+    assert (process.returncode, errors) == (0, "")
     table = parquet.read_table(out / "runs.parquet")
     assert table["run"].to_pylist() == list(range(RUNS))
     assert table.equals(parquet.read_table(workplace / "peace" / "runs.parquet"))

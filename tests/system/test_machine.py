@@ -10,10 +10,7 @@ import json
 import resource
 import signal
 import subprocess
-import sys
 import time
-from datetime import datetime, timedelta, tzinfo
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -23,13 +20,10 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.commands.streams import INTERRUPTED
-from orchestrator.machine.disk import hold_lock
-from orchestrator.runs import result
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.result import read_result
 from orchestrator.runs.tables import read_rows
 from support.machine import (
-    LOOPS,
     called,
     contents,
     eventually,
@@ -64,14 +58,12 @@ def failure(folder: Path) -> str:
 RUN = ["run", "fig4", "--no-figures", "--stop-time"]
 
 
-@pytest.mark.parametrize(
-    ("ending", "loop"), [("csv", "python"), ("csv", "compiled"), ("parquet", "auto")]
-)
+@pytest.mark.parametrize(("ending", "loop"), [("csv", "python"), ("parquet", "compiled")])
 def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending, loop):
-    """There is room for some thousand of a million."""
+    """There is room for some of a million rows."""
     if ending == "parquet":
         pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
-    with small_disk(workplace / "disk", 14_000_000) as disk:
+    with small_disk(workplace / "disk", 3_000_000) as disk:
         out = ["--out", str(disk / "r"), "--format", ending, "--loop", loop]
         assert main([*RUN, "0.1", *out]) == 0
         before = contents(disk)
@@ -85,26 +77,26 @@ def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending
         incomplete = disk / "r" / "incomplete"
         assert {name: after[name] for name in after if "incomplete" not in name} == before
         kept = rows(incomplete, ending)
-        assert len(kept) > 1000
+        assert len(kept) > 100
         assert np.array_equal(kept, simulate("fig4", stop_time=(len(kept) - 1) * 0.02).rows)
         assert read_result(incomplete)[1].failure == why.removeprefix("auv-fmu: fig4 ")
 
 
-@pytest.mark.parametrize("size", [60_000, 150_000, 500_000, 900_000])
+@pytest.mark.parametrize("size", [60_000, 150_000, 900_000])
 def test_full_disk_at_any_stage(workplace, capsys, size):
     """The table takes 0.2 MB, figures another 0.9 MB."""
     with small_disk(workplace / "disk", size) as disk:
         folder = disk / "r"
         status = main(["run", "fig4", "--stop-time", "2", "--out", str(folder)])
-        said = capsys.readouterr().err.splitlines()
-        assert len(said) == 1
-        assert "No space left on device" in said[0]
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == 1
+        assert "No space left on device" in lines[0]
         if status == 2:
-            # Not even what is taken before the first row.
+            # There was no room even before the first row.
             assert contents(disk) == {}
             return
         assert status == 1
-        assert failure(folder) in said[0]
+        assert failure(folder) in lines[0]
         whole = simulate("fig4", stop_time=2.0).rows
         kept = rows(folder)
         assert np.array_equal(kept, whole[: len(kept)])
@@ -115,7 +107,7 @@ def test_full_disk_at_any_stage(workplace, capsys, size):
 
 
 def test_no_room_for_the_folder_of_a_companion(workplace, capsys, monkeypatch):
-    """What is compared with it stays, with its record."""
+    """The first run stays, with its record."""
     mkdir = Path.mkdir
 
     def full(path: Path, *arguments: Any, **options: Any) -> None:
@@ -130,21 +122,14 @@ def test_no_room_for_the_folder_of_a_companion(workplace, capsys, monkeypatch):
     assert "No space left" in failure(Path("r"))
 
 
-def test_full_temporary_folder_is_named(workplace):
+@pytest.mark.parametrize("variable", ["TMPDIR", "XDG_CACHE_HOME"])
+def test_full_folder_is_named_and_left_empty(workplace, variable):
+    """For temporary files, and the cache."""
     with small_disk(workplace / "disk", 300_000) as disk:
-        status, [line] = called(*RUN, "0.1", environment={"TMPDIR": str(disk)})
+        status, lines = called(*RUN, "0.1", environment={variable: str(disk)})
         assert status == 2
-        assert mentions(line, f"{disk} No space left TMPDIR")
-        assert list(disk.iterdir()) == []
-
-
-def test_full_cache_is_named_and_left_empty(workplace):
-    with small_disk(workplace / "disk", 300_000) as disk:
-        status, said = called(*RUN, "0.1", environment={"XDG_CACHE_HOME": str(disk)})
-        assert status == 2
-        assert "No space left on device" in said[-1]
-        assert not list(disk.glob("auv-fmu/fmus/*"))
-        assert not list(disk.glob("auv-fmu/fmus/.*"))
+        assert mentions(lines[-1], f"{disk} No space left")
+        assert not list(disk.glob("auv*/*/*"))
 
 
 def test_limit_of_the_size_of_files_is_like_a_full_disk(workplace):
@@ -159,16 +144,15 @@ def test_limit_of_the_size_of_files_is_like_a_full_disk(workplace):
     assert len(kept) > 500
 
 
-@pytest.mark.parametrize("megabytes", [200, 235])
-def test_short_memory_is_said_and_loses_no_rows(workplace, megabytes):
-    """Python and numpy alone need 150 MB of address space, figures 300."""
-    limit = {resource.RLIMIT_AS: megabytes * 10**6}
-    status, said = called("run", "fig4", "--stop-time", "1", limits=limit)
+def test_short_memory_is_said_and_loses_no_rows(workplace):
+    """Python and numpy need 150 MB of address space, figures 300."""
+    limit = {resource.RLIMIT_AS: 235 * 10**6}
+    status, lines = called("run", "fig4", "--stop-time", "1", limits=limit)
     assert status in (1, 2)
-    assert not [line for line in said if "Traceback" in line]
-    if status == 1 and said[-1].startswith("auv-fmu: fig4"):
+    assert not [line for line in lines if "Traceback" in line]
+    if status == 1 and lines[-1].startswith("auv-fmu: fig4"):
         assert len(rows(workplace / "results" / "fig4")) == 51
-        assert failure(workplace / "results" / "fig4") in said[-1]
+        assert failure(workplace / "results" / "fig4") in lines[-1]
 
 
 def test_folders_that_may_not_be_written(workplace):
@@ -188,9 +172,9 @@ def test_folders_that_may_not_be_written(workplace):
             assert "Permission denied" in line
             assert "; choose " in line
         assert contents(sealed) == before
-        # To look at it needs no more than to read it.
-        status, said = called("plot", "sealed/r", before=without_privileges)
-        assert (status, said) == (0, [])
+        # `plot` without a file only reads.
+        status, lines = called("plot", "sealed/r", before=without_privileges)
+        assert (status, lines) == (0, [])
     finally:
         for path in (sealed, sealed / "r"):
             path.chmod(0o700)
@@ -205,12 +189,12 @@ def test_home_that_may_not_be_written(workplace):
 
 
 def test_no_home_and_no_temporary_folder(workplace):
-    status, said = called(*RUN, "0.1", environment={"HOME": None, "TMPDIR": "/nonexistent"})
-    assert (status, said) == (0, [])
+    status, lines = called(*RUN, "0.1", environment={"HOME": None, "TMPDIR": "/nonexistent"})
+    assert (status, lines) == (0, [])
 
 
 def under_way(folder: Path) -> bool:
-    """Whether rows are on their way into a folder."""
+    """True if a run writes rows into a folder."""
     return any(path.stat().st_size > 1e5 for path in folder.glob(".auv-fmu-*/result.csv"))
 
 
@@ -221,10 +205,14 @@ def running(loop: str = "auto") -> subprocess.Popen[str]:
     return process
 
 
-@pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize(
-    "signals",
-    [[signal.SIGTERM], [signal.SIGHUP], [signal.SIGINT] * 5],
+    ("signals", "loop"),
+    [
+        ([signal.SIGTERM], "python"),
+        ([signal.SIGHUP], "compiled"),
+        ([signal.SIGINT] * 5, "python"),
+        ([signal.SIGINT] * 5, "compiled"),
+    ],
 )
 def test_signals_end_a_run_and_lose_nothing(workplace, temporary, signals, loop):
     process = running(loop)
@@ -277,9 +265,10 @@ class Hanging(Fmi2Slave):
 """
 
 
-@pytest.mark.parametrize("loop", LOOPS)
 @pytest.mark.parametrize(
-    "hang", ["pass", "import ctypes; ctypes.CDLL(None).poll(None, 0, -1)"], ids=["Python", "C"]
+    ("hang", "loop"),
+    [("pass", "python"), ("import ctypes; ctypes.CDLL(None).poll(None, 0, -1)", "compiled")],
+    ids=["Python", "C"],
 )
 def test_the_third_signal_ends_an_fmu_that_hangs_and_keeps_the_rows(workplace, hang, loop):
     Path("hanging.py").write_text(HANGING.format(hang=hang))
@@ -299,31 +288,25 @@ def test_the_third_signal_ends_an_fmu_that_hangs_and_keeps_the_rows(workplace, h
 
 
 def test_the_end_of_the_terminal_means_nothing_under_nohup(workplace):
-    process = start(*RUN, "5", before=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
+    process = start(*RUN, "2", before=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN))
     while process.poll() is None:
         process.send_signal(signal.SIGHUP)
         time.sleep(0.1)
     assert process.communicate()[1] == ""
     assert process.returncode == 0
-    assert len(rows(workplace / "results" / "fig4")) == 251
+    assert len(rows(workplace / "results" / "fig4")) == 101
 
 
 def busy(process: subprocess.Popen[str], temporary: Path) -> bool:
-    """Whether a process has children, which have begun to write temporary files."""
+    """True if a process has children, which have begun to write temporary files."""
     return len(members(process.pid)) > 1 and any(temporary.glob("auvfmu-*/*/*"))
 
 
 @pytest.mark.parametrize(
-    ("command", "number"),
-    [
-        ("build", signal.SIGTERM),
-        ("build", signal.SIGKILL),
-        ("report", signal.SIGHUP),
-        ("report", signal.SIGKILL),
-    ],
+    ("command", "number"), [("build", signal.SIGKILL), ("report", signal.SIGHUP)]
 )
 def test_children_end_with_their_parent(workplace, temporary, command, number):
-    """And what was good stays good, byte for byte; nothing stays but what the next one removes."""
+    """Earlier files stay as they were; the next command removes temporary files."""
     out = workplace / "out"
     out.mkdir()
     for name in ("mine.ssp", "mine.html", "mine.json"):
@@ -357,33 +340,3 @@ def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
         f"with the results in {left.name}"
     )
     assert rows(left)[0, 0] == 0.0
-
-
-@pytest.mark.parametrize("command", [["run", "fig4"], ["export", "fig4"], ["build"], ["report"]])
-def test_a_folder_that_another_process_writes_into_is_left_alone(workplace, capsys, command):
-    (workplace / "r").mkdir()
-    with hold_lock(workplace / "r"):
-        assert main([*command, "--out", "r"]) == 2
-    assert "into r;" in capsys.readouterr().err
-    assert contents(workplace) == {}
-
-
-@pytest.mark.parametrize("hours", [-1000, 1000])
-def test_a_clock_that_jumps_changes_no_duration(workplace, monkeypatch, capsys, hours):
-    """With the bar, which a terminal would show."""
-    jump = count(step=hours)
-
-    class Jumping(datetime):
-        @classmethod
-        def now(cls, tz: tzinfo | None = None) -> datetime:
-            return datetime.now(tz) + timedelta(hours=next(jump))
-
-    monkeypatch.setattr(time, "time", lambda now=time.time: now() + 3600 * next(jump))
-    monkeypatch.setattr(result, "datetime", Jumping)
-    monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    begun = time.monotonic()
-    assert main([*RUN, "20"]) == 0
-    taken = time.monotonic() - begun
-    told = json.loads(Path("results/fig4/run.json").read_text())["seconds"]
-    assert 0.0 < told <= taken
-    assert len(rows(workplace / "results" / "fig4")) == 1001

@@ -51,7 +51,7 @@ def other() -> Iterator[int]:
 
 @pytest.fixture
 def open_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    """A folder that everybody can write into, in which the cache is to be."""
+    """A folder that everybody can write into, for the cache."""
     folder = Path(mkdtemp())
     folder.chmod(0o1777)
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
@@ -60,7 +60,7 @@ def open_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 
 
 def done_by(user: int, what: Callable[[], object]) -> bool:
-    """Whether another user can do something, in a copy of this process."""
+    """True if another user can do something, in a copy of this process."""
     child = os.fork()
     if child == 0:
         try:
@@ -76,7 +76,7 @@ def done_by(user: int, what: Callable[[], object]) -> bool:
 
 @pytest.fixture
 def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A cache of another user's, with what it takes to be taken for ours; where marks are left."""
+    """A cache of another user's that looks like ours; the file that its library makes."""
     mark = tmp_path / "mark"
     source = tmp_path / "planted.c"
     source.write_text(LIBRARY.replace("MARK", str(mark)))
@@ -92,7 +92,7 @@ def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.M
         for folder in (forged / "auv-fmu").iterdir():
             shutil.copytree(folder, open_folder / "auv-fmu" / folder.name)
 
-    # As it was made with umask 0, or by the other user.
+    # The folder was made with umask 0, or by the other user.
     (open_folder / "auv-fmu").mkdir()
     (open_folder / "auv-fmu").chmod(0o777)
     assert done_by(other, plant)
@@ -101,7 +101,7 @@ def planted(open_folder: Path, other: int, tmp_path: Path, monkeypatch: pytest.M
 
 
 @pytest.mark.parametrize("owner", ["root", "other"])
-def test_what_another_user_has_put_into_the_cache_is_not_run(
+def test_files_of_another_user_in_the_cache_are_not_run(
     dist, workplace, planted, open_folder, other, owner
 ):
     if owner == "other":
@@ -115,7 +115,7 @@ def test_what_another_user_has_put_into_the_cache_is_not_run(
         assert not read_cached("loop", loop.key_of())
 
 
-def test_once_the_folder_is_mended_files_of_another_user_are_not_run(planted, open_folder):
+def test_files_of_another_user_are_not_run_after_the_folder_is_mended(planted, open_folder):
     subprocess.run(["chmod", "-R", "go-w", open_folder / "auv-fmu"], check=True)
     for folder in (open_folder / "auv-fmu").iterdir():
         os.chown(folder, 0, 0)
@@ -131,8 +131,8 @@ def test_a_folder_cannot_be_made_before_us(open_folder, other):
     assert path.is_relative_to(process_folder())
 
 
-def test_a_ledger_of_another_user_says_nothing_of_our_files(open_folder, other):
-    """In a folder that all can write, above a file of ours that has a ledger or none."""
+def test_a_ledger_of_another_user_is_ignored(open_folder, other):
+    """In a folder that all can write, above a file of this user's with or without a ledger."""
     forged = {"ours/a": sha256(b"forged").hexdigest()}
     content = {"identity": "0" * 32, "files": forged, "moving": forged}
 
@@ -150,7 +150,7 @@ def test_a_ledger_of_another_user_says_nothing_of_our_files(open_folder, other):
     assert not is_changed(file)
     with pytest.raises(Taken, match="damaged or not from auv-fmu"):
         Ledger(open_folder)
-    # A whole folder of another user's is read as it is meant.
+    # A folder that belongs to the other user is read as it is.
     for path in (open_folder, file.parent, file):
         os.chown(path, other, other)
     assert locate(file).read_text() == "forged"

@@ -13,7 +13,13 @@ from fmpy.util import read_csv, read_ref_opt_file, write_csv
 
 from fmus.discovery import REFERENCE, components, source_of
 from orchestrator.commands.main import main
-from orchestrator.cosim import Exchange, Experiment, Order, PortName, System, read_component
+from orchestrator.cosim import (
+    Experiment,
+    Order,
+    PortName,
+    System,
+    read_component,
+)
 from orchestrator.exchange.verify import verify
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.wiring import closed_loop
@@ -50,7 +56,7 @@ def test_a_fresh_run_of_the_system_is_the_reference(system: System):
 @pytest.mark.parametrize("order", Experiment.ORDERS)
 def test_own_table_is_verified_in_its_order(system: System, tmp_path: Path, order: Order):
     path = tmp_path / "ours.csv"
-    write(run(system, 2.0, 0.02, order), path)
+    write(run(system, 1.0, 0.02, order), path)
     assert f" s, in {order} order\n" in verify(path, system, 1e-12)
 
 
@@ -64,7 +70,7 @@ def test_own_table_of_another_step_is_verified_with_that_step(workplace, capsys)
     assert tells(capsys.readouterr().out, (70, 70, 0, 34, 0.03, 1))
 
 
-def test_table_of_one_fmu_is_told_from_that_of_a_system(system: System, tmp_path: Path):
+def test_table_of_one_fmu_is_distinguished_from_a_systems(system: System, tmp_path: Path):
     """Most of its columns are the plant's; others have a `fault`, too."""
     path = tmp_path / "table.csv"
     path.write_text("time,fault,eta.x[REAL], y.x\n0,false,2,2\n1,false,2,2\n")
@@ -75,10 +81,9 @@ def test_table_of_one_fmu_is_told_from_that_of_a_system(system: System, tmp_path
         verify(path, system, 1e-6)
 
 
-@pytest.mark.parametrize("name", ["MotionPlanner", "DisturbanceGenerator"])
-def test_table_of_a_tool_that_runs_one_fmu_is_verified(dist, tmp_path, capsys, name):
+def test_table_of_a_tool_that_runs_one_fmu_is_verified(dist, tmp_path, capsys):
     """Its columns have the names of ports, without a component."""
-    fmu, table = str(dist / f"{name}.fmu"), tmp_path / "table.csv"
+    fmu, table = str(dist / "MotionPlanner.fmu"), tmp_path / "table.csv"
     rows = fmpy.simulate_fmu(fmu, stop_time=1.0, output_interval=0.02)
     write_csv(str(table), rows)
     assert main(["verify", str(table), "--scenario", fmu]) == 0
@@ -86,7 +91,7 @@ def test_table_of_a_tool_that_runs_one_fmu_is_verified(dist, tmp_path, capsys, n
     rows[rows.dtype.names[1]][20] += 1.0
     write_csv(str(table), rows)
     assert main(["verify", str(table), "--scenario", fmu]) == 2
-    assert f"{name}.{rows.dtype.names[1]}" in capsys.readouterr().err
+    assert f"MotionPlanner.{rows.dtype.names[1]}" in capsys.readouterr().err
 
 
 def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
@@ -97,10 +102,10 @@ def test_table_of_another_tool_is_understood(system: System, tmp_path: Path):
     lines = ['"Time", "auv.plant::eta.x[REAL]","controller.fault","controller.saturation"']
     lines += [f"{t!r}, {x!r},False,tanh" for t, x in ((float(t), float(x)) for t, x in rows)]
     path.write_text("\n".join(lines))
-    said = verify(path, system, 1e-9)
-    assert tells(said, (2, 70, 1e-9, 20, 0.1, 2)) and "jacobi" in said
-    assert "outputs: controller.saturation" in said
-    assert mentions(said, "68, plant.eta.y,")
+    report = verify(path, system, 1e-9)
+    assert tells(report, (2, 70, 1e-9, 20, 0.1, 2)) and "jacobi" in report
+    assert "outputs: controller.saturation" in report
+    assert mentions(report, "68, plant.eta.y,")
 
 
 def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
@@ -108,9 +113,9 @@ def test_first_port_that_differs_is_named(system: System, tmp_path: Path):
     result.rows[60:, result.columns.index("planner.y_d.z") + 1] += 1e-3
     result.rows[80:, result.columns.index("plant.eta.x") + 1] += 1.0
     write(result, tmp_path / "wrong.csv")
-    with pytest.raises(InputError, match=r"planner\.y_d\.z differs first, at t = 1\.2 s") as told:
+    with pytest.raises(InputError, match=r"planner\.y_d\.z differs first, at t = 1\.2 s") as error:
         verify(tmp_path / "wrong.csv", system, 1e-6)
-    assert f"wrong.csv: not a run of {system.name}, which --scenario names: in " in str(told.value)
+    assert f"wrong.csv: not a run of {system.name}, which --scenario names: in " in str(error.value)
 
 
 class OtherTool:
@@ -185,7 +190,7 @@ class OtherTool:
 def test_table_of_a_tool_that_reads_outputs_after_it_has_passed_them_on_is_certified(
     native: Path, tmp_path: Path
 ):
-    """The others step with what they had before, as PyFMI and ecos do."""
+    """The others step with earlier values, as PyFMI and ecos do."""
     path, system = tmp_path / "table.csv", closed_loop(native)
     tool, rows = OtherTool(system, "full"), []
     for k in range(200):
@@ -204,11 +209,11 @@ def test_table_of_a_tool_that_reads_outputs_after_it_has_passed_them_on_is_certi
 def test_table_of_a_tool_that_follows_feedthrough_is_certified_before_and_after_it_does(
     native: Path, tmp_path: Path
 ):
-    """OMSimulator writes both rows, of which the first counts."""
+    """OMSimulator writes both rows; the first counts."""
     path, system = tmp_path / "table.csv", closed_loop(native)
     tool, before, after = OtherTool(system, "full"), [], []
     for k in range(200):
-        # What comes round is there after as many exchanges as there are components.
+        # Values have come round after as many exchanges as there are components.
         for name in ORDER * len(ORDER):
             tool.set(name)
             tool.read(name)
@@ -233,10 +238,13 @@ def certified(path: Path, system: System, way: str) -> None:
     assert numbers_in(compared)[:2] == [66, 70] and compared.endswith(f" s, {way}")
 
 
-@pytest.mark.parametrize("initial", Exchange.INITIAL)
 @pytest.mark.parametrize(
-    "order",
-    [ORDER, ("planner", *ORDER[:3]), ("plant", *ORDER[:0:-1]), ("planner", "+".join(ORDER[:3]))],
+    ("order", "initial"),
+    [
+        (ORDER, "full"),
+        (("planner", *ORDER[:3]), "none"),
+        (("planner", "+".join(ORDER[:3])), "zero"),
+    ],
 )
 def test_table_of_a_tool_with_an_order_of_its_own_is_certified(
     native: Path, tmp_path: Path, order: tuple[str, ...], initial: str
@@ -244,28 +252,19 @@ def test_table_of_a_tool_with_an_order_of_its_own_is_certified(
     path, system = tmp_path / "table.csv", closed_loop(native)
     tool = OtherTool(system, initial)
     tool.write(path, tool.rows([name.split("+") for name in order]))
-    said = verify(path, system, 1e-12, order, initial=initial)
-    compared, *_ = said.splitlines()
+    report = verify(path, system, 1e-12, order, initial=initial)
+    compared, *_ = report.splitlines()
     assert numbers_in(compared)[:6] == [66, 70, 1e-12, 200, 0.02, 4]
     assert ",".join(order) in compared
     assert compared.endswith("outputs") == (initial == "full")
+    if initial == "none":
+        command = ["verify", str(path), "--tolerance", "1e-12", "--order", ",".join(order)]
+        assert main([*command, "--initial", "none"]) == 0
+        assert main(command) == 2
     other = "none" if initial == "full" else "full"
     for asked in ({}, {"order": order, "initial": other}, {"order": OTHER_ORDER}):
         with pytest.raises(InputError, match="differs"):
             verify(path, system, 1e-9, **asked)
-
-
-def test_table_of_a_tool_without_an_exchange_at_the_start_is_certified(
-    native: Path, tmp_path: Path
-):
-    path, system = tmp_path / "table.csv", closed_loop(native)
-    tool = OtherTool(system, "none")
-    tool.write(path, tool.rows([ORDER]))
-    assert "jacobi" in verify(path, system, 1e-12, initial="none")
-    options = ["verify", str(path), "--tolerance", "1e-12"]
-    assert main([*options, "--initial", "none", "--order", "jacobi"]) == 0
-    assert main([*options, "--initial", "none", "--order", "gauss-seidel"]) == 2
-    assert main(options) == 2
 
 
 def test_host_without_initial_exchange_ends_where_the_others_end(native: Path):
@@ -291,8 +290,7 @@ def test_order_that_names_no_component_or_not_all_is_refused(system: System):
             verify(COMMITTED / "auv_ref.csv", system, 1e-9, order)
 
 
-@pytest.mark.parametrize("end", [4.0, 4.000000000000001])
-@pytest.mark.parametrize("prefix", ["auv.auv.", "model.root.", "a.b.c.d."])
+@pytest.mark.parametrize(("prefix", "end"), [("auv.auv.", 4.0), ("a.b.c.d.", 4.000000000000001)])
 def test_first_row_of_a_time_counts_and_systems_may_stand_before_a_name(
     system: System, tmp_path: Path, prefix: str, end: float
 ):
@@ -315,8 +313,7 @@ def cells(path: Path) -> list[list[str]]:
         return [line.rstrip("\n").split(",") for line in lines]
 
 
-@pytest.mark.parametrize("separator", [";", "\t", ", "])
-@pytest.mark.parametrize("mark", ["", "\ufeff"])
+@pytest.mark.parametrize(("separator", "mark"), [(";", ""), ("\t", "\ufeff"), (", ", "")])
 def test_table_with_another_separator_and_a_byte_order_mark_is_read(
     system: System, tmp_path: Path, separator: str, mark: str
 ):
@@ -326,7 +323,7 @@ def test_table_with_another_separator_and_a_byte_order_mark_is_read(
     assert tells(verify(path, system, 1e-9), (200, 0.02, 4))
 
 
-def test_what_was_not_compared_is_named(system: System, tmp_path: Path):
+def test_columns_that_were_not_compared_are_named(system: System, tmp_path: Path):
     """The row at the start, inputs, parameters, what looks like a port, and what is missing."""
     rows = cells(COMMITTED / "auv_ref.csv")[:102]
     keep = [rows[0].index(name) for name in ("time", "plant.eta.x", "plant.tau.u", "plant.y.z")]
@@ -350,7 +347,7 @@ def test_what_was_not_compared_is_named(system: System, tmp_path: Path):
     assert not {"plant.eta.x", "plant.y.z"} & set(absent)
 
 
-@pytest.mark.parametrize("tolerance", [float("inf"), float("nan"), -1e-9, 1.0])
+@pytest.mark.parametrize("tolerance", [float("nan"), -1e-9, 1.0])
 def test_tolerance_that_would_accept_anything_is_refused(system: System, tolerance: float):
     with pytest.raises(InputError, match="tolerance"):
         verify(COMMITTED / "auv_ref.csv", system, tolerance)
@@ -366,35 +363,25 @@ def test_own_run_that_fails_certifies_nothing(system: System):
     ("text", "reason"),
     [
         ("", "column time"),
-        ("time\n0\n1\n", "column output"),
         ("time,plant.eta.x\n0,1\n1,nan\n", "3, plant.eta.x 'nan'"),
-        ("time,plant.eta.x\n0,1\n1,1e999\n", "'1e999'"),
         ("time,plant.eta.x\n0,1\n1,\n", "3, plant.eta.x ''"),
-        ("time,plant.eta.x\n0,1\n1,1_0\n", "'1_0'"),
         ("time,plant.eta.x\n0,1\n1,\u0661\n", "3, plant.eta.x"),
         ("time;plant.eta.x\n0;1\n1;2,5\n", "'2,5'"),
-        ("time,depth\n0,1\n1,2\n", "column output"),
         ("clock,plant.eta.x\n0,1\n1,2\n", "column time"),
-        ("time plant.eta.x\n0 1\n1 2\n", "column time"),
         ("time,Time,plant.eta.x\n0,0,1\n1,1.5,2\n", "line 3 time 1 1.5"),
         ("time,plant.eta.x\n0,1\n0,2\n", "row 0"),
         ("time,plant.eta.x\n0,1\n2,2\n1,2\n", "4: 1 2"),
         ("time,plant.eta.x\n-1,1\n1,2\n", "2: -1"),
         ("time,plant.eta.x\n0,1\nnan,2\n1,2\n", "3, time: 'nan'"),
-        ("time,plant.eta.x\n0,1\n", "row 0"),
         ("time,plant.eta.x\n", "row 0"),
-        ("time,plant.eta.x\nzero,1\none,2\n", "'zero'"),
         ("time,plant.eta.x\n0,1\n1\n", "3 1 2"),
-        ("time,plant.eta.x\n0,1\n1,2,3\n", "3 3 2"),
         ("time,plant.eta.x\n0,1\n\n1,2\n", "3 empty"),
         ('time,plant.eta.x\n0,1\n1,"2"5\n', "expected after"),
         ('time,plant.eta.x\n0,1\n1,"2\n', "end"),
         ('time,plant.eta.x,b\n0,1,"\n1,2,"\n2,1,a\n', "2: quotes"),
         ("time,plant.eta.x,plant::eta.x[REAL]\n0,1,1\n", "2 3 plant.eta.x"),
-        ("time,auv.plant.eta.x,plant.eta.x\n0,1,1\n", "2 3 plant.eta.x"),
         ("time,a.b.plant::eta.x,c.plant.eta.x\n0,1,1\n", "2 3 plant.eta.x"),
         ("time,controller.fault\n0,false\n1,maybe\n", "'maybe'"),
-        ("time,plant.eta.x\n0,true\n1,true\n", "'true'"),
     ],
 )
 def test_table_that_cannot_be_used_is_refused(system, tmp_path, text, reason):

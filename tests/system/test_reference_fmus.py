@@ -1,9 +1,9 @@
 """The Reference FMUs of the Modelica Association give the results that are published in them.
 
 The variable REFERENCE_FMUS names a folder with a release of github.com/modelica/Reference-FMUs, or
-with what its own build makes: FMUs in `2.0` and `3.0`. Both solve with a fixed step of their own,
-explicit Euler's, so the master has to come to the same numbers bit for bit. No result uses event
-mode. The counter of Stair is ten after nine seconds, where it ends the run.
+with the products of its own build: FMUs in `2.0` and `3.0`. Both solve with explicit Euler's fixed
+steps, so the master has to come to the same numbers bit for bit. No result uses event mode. The
+counter of Stair is ten after nine seconds, where it ends the run.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from support.texts import mentions
 _FOLDER = Path(os.environ.get("REFERENCE_FMUS", ""))
 _MODELS = ("BouncingBall", "Dahlquist", "Feedthrough", "Resource", "Stair", "VanDerPol")
 
-#: Of outputs in the results, these are left alone, or FMI 2.0 does not have them.
+#: Outputs that the master does not take, and outputs that FMI 2.0 has.
 _LEFT_OUT = ("Binary_output",)
 _OF_FMI_2 = (
     "Float64_continuous_output", "Float64_discrete_output", "Int32_output", "Boolean_output",

@@ -1,4 +1,4 @@
-"""What a command refuses it refuses in one line with status 2, and it leaves nothing behind."""
+"""Commands refuse bad input in one line with status 2, and write nothing."""
 
 from __future__ import annotations
 
@@ -30,14 +30,7 @@ KINDS = (
     "below a file", "without permission",
 )  # fmt: skip
 
-#: Numbers that look odd and are none the less what they should be.
-GOOD = {
-    ("--stop-time", "1e-320"), ("--interval", "1e-320"), ("--interval", "inf"),
-    ("--interval", "1e400"), ("--tolerance", "0"), ("--tolerance", "1e-320"),
-    ("--step-timeout", "1e-320"), ("--real-time", "1e-320"), ("--checkpoint-every", "1e-320"),
-}  # fmt: skip
-
-#: Texts that are no good, by the names of their files.
+#: Bad texts, by the names of their files.
 TEXTS = {
     "arrays.toml": f"only = {'[' * 5000}{']' * 5000}",
     "bool.toml": "stop_time = true",
@@ -45,9 +38,7 @@ TEXTS = {
     "digits.toml": f"stop_time = {'9' * 400}",
     "falling.csv": "time,a.b\n1,2\n0,1\n",
     "figure.toml": "figure = 'none'",
-    "infinite.toml": f"parameters.plant.m11 = {'9' * 400}",
     "keys.toml": f"parameters.{'.'.join('a' * 2000)} = 1",
-    "list.toml": f"stop_time = {'[' * 50}{']' * 50}",
     "misspelt.toml": '[components]\nplanner = "MotionPlaner"',
     "missing.toml": '[components]\ncontroller = "missing.fmu"',
     "more_digits.toml": f"stop_time = {'9' * 5000}",
@@ -72,7 +63,7 @@ def workplace(workplace: Path) -> Path:
 
 
 def bad_file(kind: str, ending: str) -> str:
-    """The name of a file that is no good."""
+    """Make a bad file, and return its name."""
     path = Path(f"bad.{ending}")
     if kind == "folder":
         path.mkdir()
@@ -101,49 +92,40 @@ def bad_file(kind: str, ending: str) -> str:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("command", COMMANDS)
-def test_bad_file_is_refused_in_one_line(
-    workplace: Path, refused: Callable[..., str], command: str, kind: str
-):
+def test_bad_file_is_refused_in_one_line(workplace: Path, refused: Callable[..., str], kind: str):
     if kind == "without permission" and os.geteuid() == 0:
         pytest.skip("root may read everything")
-    arguments, endings = COMMANDS[command]
-    for ending in endings:
+    # Commands read files by the same functions: each meets some kinds.
+    commands, names = [*COMMANDS.values()][KINDS.index(kind) % 3 :: 3], {}
+    for arguments, ending in ((words, ending) for words, endings in commands for ending in endings):
         if ending == "parquet":
             pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
-        name = bad_file(kind, ending)
+        name = names[ending] = names.get(ending) or bad_file(kind, ending)
         shown = name if kind != "zero in name" else r"a\x00b"
         assert shown in refused(*(name if word == "?" else word for word in arguments))
 
 
-@pytest.mark.parametrize("number", ["nan", "inf", "-inf", "-1", "0", "1e-320", "1e400"])
 @pytest.mark.parametrize(
-    "arguments",
+    ("command", "numbers"),
     [
-        ["run", "fig4", "--stop-time"],
-        ["run", "fig4", "--step"],
-        ["run", "fig4", "--stop-time", "0.1", "--interval"],
-        ["run", "fig4", "--isolate", "--step-timeout"],
-        ["run", "fig4", "--checkpoint-every"],
-        ["run", "fig4", "--real-time"],
-        ["export", "fig4", "--step"],
-        ["animate", "fig4", "--step"],
-        ["animate", "fig4", "--stop-time"],
-        ["verify", "file.csv", "--tolerance"],
-        ["verify", "file.csv", "--step"],
+        ("run fig4 --stop-time", "nan inf -1 0"),
+        ("run fig4 --step", "nan -inf 0 1e-320"),
+        ("run fig4 --stop-time 0.1 --interval", "nan -1 0"),
+        ("run fig4 --isolate --step-timeout", "nan inf 0"),
+        ("run fig4 --checkpoint-every", "nan 1e400 0"),
+        ("run fig4 --real-time", "nan inf 0"),
+        ("export fig4 --step", "nan 0"),
+        ("animate fig4 --step", "nan 0"),
+        ("animate fig4 --fps", "0 -1 99999999999999999999"),
+        ("verify file.csv --tolerance", "nan -1"),
+        ("verify file.csv --step", "nan 0"),
+        ("hosts --steps", "0 -1 99999999999999999999"),
     ],
 )
-def test_number_that_makes_no_sense_is_refused(workplace, refused, arguments, number):
-    *command, option = arguments
-    if (option, number) in GOOD:
-        pytest.skip("the option takes this number")
-    assert refused(*command, f"{option}={number}")
-
-
-@pytest.mark.parametrize("number", ["0", "-1", "99999999999999999999"])
-@pytest.mark.parametrize("arguments", [["hosts", "--steps"], ["animate", "fig4", "--fps"]])
-def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, number):
-    assert refused(*arguments, number)
+def test_number_that_makes_no_sense_is_refused(workplace, refused, command, numbers):
+    for number in numbers.split():
+        *words, option = command.split()
+        assert refused(*words, f"{option}={number}")
 
 
 @pytest.mark.parametrize(
@@ -158,10 +140,8 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
         ("run fig4 --set plant.noise.seed=1_0", "integer"),
         ("run fig4 --set plant.m11=\u0662", "real"),
         ("run fig4 --stop-time 1e300", "steps"),
-        ("run fig4 --step 1e-300", "steps"),
         ("run fig4 --out file.csv/below", "--out"),
         (["run", "fig4", "--out", ""], "--out"),
-        (["run", "fig4", "--order", ""], "--order"),
         ("run fig4 --order=", "--order="),
         ("run fig4 --order random", "random"),
         ("run fig4 --columns plant.tua.*", "plant.tua.*"),
@@ -179,9 +159,7 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
                 ("compare.toml", "'nosuch' name components"),
                 ("digits.toml", "finite"),
                 ("figure.toml", "'none'"),
-                ("infinite.toml", "finite"),
                 ("keys.toml", "nested"),
-                ("list.toml", "[[[[[[[[[[[[["),
                 ("misspelt.toml", "planner 'MotionPlaner' MotionPlanner"),
                 ("missing.toml", "missing.fmu"),
                 ("more_digits.toml", "more_digits.toml limit"),
@@ -197,8 +175,6 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
             )
         ),
         ("gains --set plant.ell=0", "plant.ell"),
-        ("gains --set controller.K1[1]=nan", "finite"),
-        ("gains --set controller.lambda=much", "real"),
         ("gains --set controller.saturation=sigmoid", "tanh, algebraic"),
         ("export fig4 --fmi 3", "--fmi 3 --kind native"),
         ("export fig4 --kind native --fmi 3 --format osp", "libcosim 3.0"),
@@ -221,11 +197,11 @@ def test_count_that_makes_no_sense_is_refused(workplace, refused, arguments, num
         ("animate fig4 --stop-time 0.1 --out film.avi", ".gif"),
         ("sweep nothing", "'nothing'"),
         ("sweep attraction --workers 0", "--workers 0"),
+        ("sweep attraction --workers 2 --scheduler nowhere", "--workers"),
+        ("sweep attraction --out file.csv", "file.csv"),
         ("report --out file.csv/below", "--out"),
         ("hosts nobody", "nobody"),
         ("new controller 3x", "'3x'"),
-        ("new controller a-b", "'a-b'"),
-        ("new controller größe", "'größe'"),
         ("new controller random", "random Python"),
         ("new controller class", "class Python"),
         ("new controller Law taken", "taken"),

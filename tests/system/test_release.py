@@ -34,8 +34,8 @@ from support.settings import NAMES, REPRESENTATIVES, WITH_INPUTS
 
 ROOT = Path(__file__).parents[2]
 
-#: How libraries begin, and numbers of processors by the names of FMI 3.0: elf.h, the format of PE,
-#: and Apple's mach/machine.h.
+#: First bytes of libraries, and numbers of processors by the names of FMI 3.0: from elf.h, the
+#: format of PE, and Apple's mach/machine.h.
 ELF, PE, MACH_O, UNIVERSAL = b"\x7fELF\x02\x01", b"PE\0\0", b"\xcf\xfa\xed\xfe", b"\xca\xfe\xba\xbe"
 PROCESSORS = {
     ELF: {62: "x86_64-linux", 183: "aarch64-linux"},
@@ -58,19 +58,19 @@ def test_wheel_builds_the_bundle_and_runs_fig4_in_an_empty_folder(tmp_path: Path
     )
     [wheel] = wheels.iterdir()
     subprocess.run([*pip, "install", "--no-deps", "--target", packages, wheel], check=True)
-    # The packages of the wheel come before those of this environment.
+    # Packages of the wheel come before the environment's.
     environment = {**os.environ, "PYTHONPATH": str(packages)}
     where = subprocess.run(
         [sys.executable, "-P", "-c", "import fmus, orchestrator; print(orchestrator.__file__)"],
         env=environment, cwd=empty, check=True, capture_output=True, text=True,
     )  # fmt: skip
     assert where.stdout.startswith(str(packages))
-    # What the report takes from pages is in the wheel, and names no test, of which it has none.
+    # Pages that the report needs are in the wheel; they name no test, since it has no tests.
     assert {path.name for path in packages.rglob("pages/*.md")} == {"paper.md", "readings.md"}
     for path in packages.rglob("*.*"):
         assert path.suffix not in (".md", ".py", ".toml") or b"tests/" not in path.read_bytes()
     command = [sys.executable, "-P", "-m", "orchestrator", "run", "fig4"]
-    # The second has all that a translation to C needs.
+    # The second needs everything for a translation to C.
     for options in ([], ["--kind", "native", "--no-figures", "--out", "results/native"]):
         subprocess.run(
             [*command, "--stop-time", "1", *options],
@@ -121,6 +121,7 @@ def test_wheel_with_all_ready_runs_fig4_without_a_compiler_and_builds_nothing(
         assert not (cache / "auv-fmu" / category).exists()
 
 
+@pytest.mark.slow
 def test_bundle_built_again_elsewhere_is_the_same_to_the_last_byte(dist: Path, tmp_path: Path):
     bundle.build_bundle(tmp_path / "elsewhere")
     kept = {name: text for name, text in contents(dist).items() if not name.startswith(".")}
@@ -228,8 +229,8 @@ def test_release_without_ziglang_is_refused(
     Path("sitecustomize.py").write_text("import sys; sys.modules['ziglang'] = None\n")
     monkeypatch.setenv("PYTHONPATH", str(workplace))
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
-    said = refused("release", "--out", "archives")
-    assert "no C compiler for " in said and "pip install 'auv-fmu[native]'" in said
+    message = refused("release", "--out", "archives")
+    assert "no C compiler for " in message and "pip install 'auv-fmu[native]'" in message
 
 
 def test_release_replaces_no_file_of_the_users(workplace: Path, refused: Callable[..., str]):

@@ -24,7 +24,7 @@ SCENARIOS = ("remus", "remus-pd")
 
 @pytest.fixture(scope="module", params=SCENARIOS)
 def result(request, native: Path) -> tuple[str, Table]:
-    found = run(closed_loop(native, read_scenario(request.param)), 280.0, 0.02)
+    found = run(closed_loop(native, read_scenario(request.param)), 280.0, 0.02, loop="compiled")
     assert found.failure is None
     return request.param, found
 
@@ -36,8 +36,8 @@ def test_controllers_follow_the_curve_as_the_remark_and_the_page_say(result):
         away[(table.time >= start) & (table.time < end)].max()
         for start, end in ((0, 40), (40, 80), (80, 120), (120, 281))
     ]
-    said = {"remus": (5.57, 0.81, 0.26, 0.18), "remus-pd": (1.46, 0.77, 0.27, 0.19)}
-    assert largest == pytest.approx(said[name], abs=0.006)
+    expected = {"remus": (5.57, 0.81, 0.26, 0.18), "remus-pd": (1.46, 0.77, 0.27, 0.19)}
+    assert largest == pytest.approx(expected[name], abs=0.006)
 
 
 def test_fins_are_at_their_limits_as_often_as_is_said(result):
@@ -48,8 +48,8 @@ def test_fins_are_at_their_limits_as_often_as_is_said(result):
         *(f"allocation.{k.replace('tau', 'tau_attained')}" for k in moments)
     )
     share = (np.abs(wanted - attained) > 1e-9).mean(axis=0)
-    said = {"remus": (0.33, 0.44), "remus-pd": (0.0, 0.0)}
-    assert share == pytest.approx(said[name], abs=0.01)
+    expected = {"remus": (0.33, 0.44), "remus-pd": (0.0, 0.0)}
+    assert share == pytest.approx(expected[name], abs=0.01)
 
 
 def test_fins_and_propeller_stay_within_their_limits(result):
@@ -71,7 +71,7 @@ def test_loop_is_found_and_its_commands_are_those_that_the_allocation_takes(name
 
 
 def test_a_run_is_measured_drawn_and_read_again(tmp_path, capsys):
-    command = ["run", "remus", "--kind", "native", "--stop-time", "5", "--out", str(tmp_path)]
+    command = ["run", "remus", "--kind", "native", "--stop-time", "0.5", "--out", str(tmp_path)]
     assert main(command) == 0
     record = json.loads((tmp_path / "run.json").read_text())
     assert loops_in(record) == (AllocatedLoop(),)
@@ -84,7 +84,7 @@ def test_a_run_is_measured_drawn_and_read_again(tmp_path, capsys):
 
 
 def test_commands_are_measured_where_the_allocation_takes_them():
-    """An actuator that is lost is lost between controller and allocation."""
+    """A lost actuator is missing between controller and allocation."""
     lost = [{"at": 0.0, "lose": "controller.tau.u"}]
     found = simulate("remus", kind="native", stop_time=2.0, events=lost)
     assert found.metrics()["peak_command"][0] == 0.0
@@ -106,13 +106,13 @@ def test_the_planner_knows_the_steady_turn_with_full_rudder(tmp_path):
         for name in ("plant.nu_r.u", "plant.nu_r.v", "plant.nu.r", "plant.tau_applied.r")
     )
     assert np.hypot(u, v) == pytest.approx(1.5, abs=0.01)
-    said = {str(name): value for name, value in read_scenario("remus").parameters.items()}
-    assert said["planner.d66"] == pytest.approx(N / r, rel=0.02)
-    assert said["planner.d22"] == pytest.approx(-said["planner.m11"] * u * r / v, rel=0.03)
-    assert said["planner.m22"] == said["planner.m33"] == said["planner.m11"]
+    expected = {str(name): value for name, value in read_scenario("remus").parameters.items()}
+    assert expected["planner.d66"] == pytest.approx(N / r, rel=0.02)
+    assert expected["planner.d22"] == pytest.approx(-expected["planner.m11"] * u * r / v, rel=0.03)
+    assert expected["planner.m22"] == expected["planner.m33"] == expected["planner.m11"]
     slowest = np.cos(np.radians(22.5))
     limits = np.multiply(slowest**2, (2.25, 1.61))
-    assert said["planner.tau_max"][1:] == pytest.approx(limits, abs=0.006)
+    assert expected["planner.tau_max"][1:] == pytest.approx(limits, abs=0.006)
 
 
 def test_the_planner_refuses_corners_beyond_the_rudder():

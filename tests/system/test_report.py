@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from orchestrator.commands import many_runs
-from orchestrator.commands.main import main
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
 from orchestrator.paper.page import errata
@@ -95,22 +93,19 @@ def test_a_scenario_that_cannot_run_says_why_and_breaks_nothing(text):
     assert "lost.fmu: no such file" in reason
 
 
-def test_what_is_wrong_in_the_paper_is_there_with_the_gain_check(text, dist):
+def test_errata_and_the_gain_check_are_in_the_report(text, dist):
     titles = re.findall("^#### .+$", errata(), re.MULTILINE)
     assert len(titles) > 20
     assert all(f"\n{title}\n" in text for title in titles)
     assert gain_check(closed_loop(dist)) in text
 
 
-def test_links_lead_somewhere(folder, page):
+def test_links_lead_somewhere_and_the_page_needs_no_other_file(folder, page):
     links = set(re.findall(r'href="([^"]+)"', page))
     assert {link[1:] for link in links if link[0] == "#"} <= set(re.findall(r' id="([^"]+)"', page))
     files = {link for link in links if link[0] != "#"}
     assert files
     assert all((folder / file).is_file() for file in files)
-
-
-def test_the_page_needs_no_other_file(page):
     sources = re.findall(r'src="([^"]+)"', page)
     assert len(sources) >= len(EFFECTS) + len(SCENARIOS) + 1
     assert all(source.startswith("data:image/png;base64,") for source in sources)
@@ -123,19 +118,3 @@ def test_the_record_names_runs_and_files(folder, text):
     assert all(command in text for command in record["runs"])
     assert {"report.md", "report.html", "run.json"} < set(record["files"])
     assert record["versions"].keys() >= {"python", "auv-fmu", "numpy"}
-
-
-def test_files_on_the_command_line_come_after_the_scenarios(tmp_path, monkeypatch, capsys):
-    asked = []
-
-    def write_report(*arguments: object, **options: object) -> tuple[Path, Path]:
-        assert options == {"kind": "auto", "force": False}
-        asked.append(arguments)
-        return Path("a"), Path("b")
-
-    monkeypatch.setattr(many_runs, "write_report", write_report)
-    assert main(["report", "mine.toml", "--out", str(tmp_path)]) == 0
-    [(folder, scenarios, command)] = asked
-    assert (folder, scenarios[-2:]) == (tmp_path, ["sea", "mine.toml"])
-    assert command == ["auv-fmu", "report", "mine.toml", "--out", str(tmp_path)]
-    assert capsys.readouterr().out == "a\nb\n"

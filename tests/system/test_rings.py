@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import permutations
 from math import isfinite, sin
 from pathlib import Path
 
@@ -49,8 +48,10 @@ def ring(folder, k: float, l: float, names: str = "sab", **kind: object) -> Syst
     return system_of({name: linear(folder, **kind) for name in names}, gains(k, l), WIRES)
 
 
-@pytest.mark.parametrize(("k", "l"), [(0.5, 0.9), (0.9, -0.9), (1.0, -2.0), (2.0, 3.0)])
-@pytest.mark.parametrize("order", Experiment.ORDERS)
+@pytest.mark.parametrize(
+    ("k", "l", "order"),
+    [(0.5, 0.9, "feedthrough"), (1.0, -2.0, "gauss-seidel"), (2.0, 3.0, "jacobi")],
+)
 @pytest.mark.parametrize("can", [True, False])
 def test_static_rings_are_solved_in_every_row_whatever_their_gain(folder, k, l, order, can):
     """By directional derivatives, and by differences."""
@@ -61,7 +62,7 @@ def test_static_rings_are_solved_in_every_row_whatever_their_gain(folder, k, l, 
 
 
 def test_a_ring_through_our_controller_is_solved_without_a_step(folder, dist: Path):
-    """What it measures follows its own command, 50 times too much for going round in circles.
+    """Its measurement follows its own command; the gain is 50 times too large for iteration.
 
     FMPy gives it alone what the ring has come to, and gets its commands after the step.
     """
@@ -85,7 +86,7 @@ def test_a_ring_through_our_controller_is_solved_without_a_step(folder, dist: Pa
     np.testing.assert_allclose(tau[:-1], alone["tau.u"][1:], rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("names", list(permutations("sab")))
+@pytest.mark.parametrize("names", ["abs", "bsa", "sba"])
 def test_the_order_of_elements_does_not_matter(folder, names):
     first, other = (
         run(ring(folder, 1.0, -2.0, some), Experiment(1.0, H)) for some in ("sab", names)
@@ -107,7 +108,7 @@ def test_both_loops_and_isolation_make_the_same_rows(folder, coupling):
         assert other.rows.tobytes() == table.rows.tobytes()
 
 
-def test_a_ring_of_components_that_is_none_of_ports_is_no_step_late(folder):
+def test_a_ring_of_components_without_a_ring_of_ports_is_not_late(folder):
     """Each output follows one input only, and the FMU says that both follow both."""
     passes = Part(D=np.eye(2))
     parts = {"s": SINE, "a": passes, "b": passes}
@@ -119,7 +120,7 @@ def test_a_ring_of_components_that_is_none_of_ports_is_no_step_late(folder):
             np.testing.assert_array_equal(table[output], table["s.y0"])
 
 
-def test_what_hangs_on_a_ring_takes_its_new_outputs(folder):
+def test_components_fed_by_a_ring_take_its_new_outputs(folder):
     """Wherever it stands; it is in no ring itself."""
     parts = {"sink": Part(D=[[0.0, 0.0], [3.0, 0.0]]), **gains(0.5, 0.9)}
     wires = {**WIRES, "sink.u0": "a.y1"}
@@ -135,9 +136,9 @@ def test_what_hangs_on_a_ring_takes_its_new_outputs(folder):
     ("order", "taken"),
     [("feedthrough", [0.0, 0.2, 0.42, 0.66]), ("gauss-seidel", [0.0, 0.22, 0.46, 0.72])],
 )
-@pytest.mark.parametrize("names", list(permutations("abs")))
-def test_of_two_solved_rings_neither_is_the_first(folder, names, order, taken):
-    """What b takes of a is no feedthrough, but new, wherever the two stand."""
+@pytest.mark.parametrize("names", ["abs", "sba"])
+def test_the_order_of_two_solved_rings_does_not_matter(folder, names, order, taken):
+    """b takes a new value from a without feedthrough, in any order of the two."""
     itself = [[0.0, 0.0], [0.5, 1.0]]
     parts = {
         "a": Part(B=[[0.0, 1.0], [0.0, 0.0]], C=[[1.0, 0.0], [0.0, 0.0]], D=itself, x=[1.0, 0.0]),
@@ -168,7 +169,7 @@ def test_fmus_that_compute_outputs_in_steps_only_are_delayed_and_one_line_says_s
 
 
 @pytest.mark.parametrize(("order", "late"), [("feedthrough", 0), ("gauss-seidel", 1)])
-@pytest.mark.parametrize("k", [-2.0, 1.5, 6.0])
+@pytest.mark.parametrize("k", [-2.0, 6.0])
 def test_a_delayed_ring_whose_values_grow_is_run_until_they_are_no_longer_finite(
     folder, k, order, late
 ):
@@ -185,8 +186,8 @@ def test_a_delayed_ring_whose_values_grow_is_run_until_they_are_no_longer_finite
     assert shorter.rows.tobytes() == table.rows.tobytes()
 
 
-@pytest.mark.parametrize("growth", [0.0, 0.3, -0.3])
-def test_what_grows_as_it_should_is_let_grow(folder, growth):
+@pytest.mark.parametrize("growth", [0.0, 0.3])
+def test_values_that_grow_without_a_fault_are_accepted(folder, growth):
     """A ramp, and exponentials of time, on a ring that is delayed."""
     parts = gains(0.5, 0.9) | {"s": Part(A=[[growth, 1.0], [0.0, growth]], C=np.eye(2), x=[0, 1])}
     system = system_of({name: linear(folder) for name in "sab"}, parts, WIRES)
@@ -214,7 +215,7 @@ class _Broken:
 
 
 @pytest.mark.parametrize("coupling", ["solve", "linear"])
-def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, coupling):
+def test_a_run_with_a_solved_ring_continues_from_its_checkpoint(folder, tmp_path, coupling):
     system, experiment = ring(folder, 1.0, -2.0), Experiment(3.0, H, coupling=coupling)
     whole, again = run(system, experiment), Table()
     kept = Checkpoints(tmp_path, {}, 1.0, resume=False)
@@ -227,10 +228,12 @@ def test_a_run_with_a_solved_ring_goes_on_where_it_was(folder, tmp_path, couplin
 
 
 @pytest.mark.parametrize(
-    ("model", "steps", "last"),
-    [(TWO_MASSES, (0.05, 0.025, 0.0125), 2e-3), (QUARTER_TRUCK, (0.005, 0.0025, 0.00125), 1e-3)],
+    ("model", "steps", "last", "says"),
+    [
+        (TWO_MASSES, (0.05, 0.025, 0.0125), 2e-3, "dependencies"),
+        (QUARTER_TRUCK, (0.005, 0.0025, 0.00125), 1e-3, "nothing"),
+    ],
 )
-@pytest.mark.parametrize("says", ["dependencies", "nothing"])
 def test_linear_inputs_are_of_second_order_where_held_ones_are_of_first(
     folder, model: Model, steps, last, says
 ):

@@ -1,4 +1,4 @@
-"""SSP archives of others, run: what stands in them is what happens."""
+"""Runs of SSP archives from other tools."""
 
 from __future__ import annotations
 
@@ -59,15 +59,14 @@ def nested(offset: float) -> str:
 
 @pytest.fixture(scope="module")
 def ssp(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An archive with two variants, of which the second is not valid to the letter."""
+    """An archive with two variants; the second is not strictly valid."""
     folder = tmp_path_factory.mktemp("ssp")
     other = described(nested(5.0), after=EXPERIMENT).replace('name="test"', 'name="test" own="1"')
     files = {"a.fmu": relay(folder), "Other.ssd": other}
     return archive(folder / "nested.ssp", described(nested(1.0), after=EXPERIMENT), files)
 
 
-@pytest.mark.parametrize("loop", ["python", "compiled"])
-@pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
+@pytest.mark.parametrize(("order", "loop"), [("gauss-seidel", "compiled"), ("jacobi", "python")])
 def test_nested_system_computes_what_it_says(ssp: Path, order: str, loop: str):
     """The integral of 2 * 3 + 1 - 4 is a ramp, which is exact in these steps."""
     result = simulate(ssp, order=order, loop=loop)
@@ -76,7 +75,7 @@ def test_nested_system_computes_what_it_says(ssp: Path, order: str, loop: str):
     assert np.array_equal(result["inner.b.y"], ramp)
     gained, taken = result["inner.c.g"], result["d.u"]
     assert np.array_equal(gained[1:], 10.0 * ramp[:-1])
-    # Side by side, what follows at once from an input is passed on a step later.
+    # In Jacobi order outputs with feedthrough are passed on a step later.
     late = order == "jacobi"
     assert np.array_equal(taken[1 + late :], -gained[1 : len(gained) - late])
 
@@ -95,7 +94,7 @@ def test_nested_component_is_set_and_shown_by_its_dotted_name(ssp: Path, capsys,
 def test_variant_is_run_with_a_warning_or_refused_by_the_strict(ssp: Path, capsys, tmp_path: Path):
     arguments = ["run", str(ssp), "--out", str(tmp_path / "out"), "--no-figures"]
     assert main([*arguments, "--variant", "Other"]) == 0
-    # The FMUs have something to say as well.
+    # There are also messages of the FMUs.
     [line] = [text for text in capsys.readouterr().err.splitlines() if ssp.name in text]
     assert "warning" in line and "'own'" in line
     assert main([*arguments, "--variant", "Other", "--strict"]) == 2
@@ -109,7 +108,7 @@ def test_variant_is_run_with_a_warning_or_refused_by_the_strict(ssp: Path, capsy
 
 
 def test_a_system_that_offers_connectors_is_one_component(tmp_path: Path):
-    """In fmpy and here, what is fed from outside is integrated inside, and seen outside."""
+    """In fmpy and here, it integrates a value from outside and gives the result to the outside."""
     parts, fmu = ("in", "out"), relay(tmp_path)
     made = relays(dict.fromkeys(parts, fmu), {"out.u": "in.y"}, step=STEP, stop_time=STOP)
     made = made.renamed({name: f"inner.{name}" for name in parts})

@@ -1,8 +1,9 @@
-"""Several vehicles in one system: each is measured and drawn as if it were alone."""
+"""Several vehicles in one system: each is measured and drawn like a single one."""
 
 from __future__ import annotations
 
 import json
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -10,19 +11,17 @@ import pytest
 
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim import PortName, System
+from orchestrator.cosim import PortName
 from orchestrator.runs.wiring import read_wiring
-from orchestrator.vehicle.cautions import velocities_reaching
-from orchestrator.vehicle.indices import INDICES, VEHICLES, index_columns
-from orchestrator.vehicle.proof import certificates, gain_check
+from orchestrator.vehicle.indices import INDICES, VEHICLES
+from orchestrator.vehicle.proof import gain_check
 from orchestrator.vehicle.signals import STANDARD, Loop, loops_of
 from support.live import needs_npm
 from support.pages import stored
 
 OTHER = Loop("tow", "pilot", "guide", "sea")
-STOP = "6"
 
-#: What the second vehicle has otherwise, by the name that its component has when it is alone.
+#: Values of the second vehicle, by names of the standard loop.
 CHANGES = {
     "plant.eta0.y": 2.0, "plant.noise.seed": 7, "controller.eps_t": 30.0, "planner.tau_d.u": 12.0,
     "disturbance.A_f": 20.0,
@@ -48,7 +47,7 @@ def scenario(path: Path, components: dict[str, str], wires: dict, values: dict) 
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
-    """Both together, and the second one alone."""
+    """Both together, and each in a run of its own."""
     folder, standard = tmp_path_factory.mktemp("vehicles"), read_wiring()
     components = {ROLES[name]: fmu for name, fmu in standard["components"].items()}
     wires = {
@@ -61,7 +60,7 @@ def results(tmp_path_factory):
     alone = scenario(folder / "one.toml", {}, {}, CHANGES)
     for name in (both, alone, "fig4"):
         out = str(folder / Path(name).stem)
-        run = ["run", str(name), "--kind", "native", "--stop-time", STOP, "--out", out]
+        run = ["run", str(name), "--kind", "native", "--stop-time", "2", "--out", out]
         assert main([*run, *(["--no-figures"] if name != both else [])]) == 0
     return folder
 
@@ -69,16 +68,12 @@ def results(tmp_path_factory):
 def test_loops_are_found_by_ports_and_wires(results):
     assert loops_of(load(results / "two.toml", "native")) == (STANDARD, OTHER)
     assert loops_of(load("fig5-pd", "native")) == (STANDARD,)
-    # Alone, what it lacks has the standard name.
+    # Parts that a scenario lacks have their standard names.
     assert loops_of(load("fig3a", "native")) == (STANDARD,)
 
 
-def test_names_of_the_standard_loop_are_those_of_its_file():
-    assert set(filter(None, vars(STANDARD).values())) == set(read_wiring()["components"])
-
-
 @pytest.mark.parametrize(("alone", "name"), [("fig4", "plant"), ("one", "tow")])
-def test_each_vehicle_has_the_numbers_that_it_has_alone(results, alone, name):
+def test_each_vehicle_has_the_numbers_of_its_own_run(results, alone, name):
     def values(folder):
         return json.loads((results / folder / "metrics.json").read_text())
 
@@ -93,25 +88,6 @@ def test_each_vehicle_has_the_numbers_that_it_has_alone(results, alone, name):
     assert apart == (results / "two" / certificates[1]).read_bytes()
 
 
-def inner(system: System) -> System:
-    """The same with components named as in a nested system, of which several may have a plant."""
-    return system.renamed({name: f"auv1.{name}" for name in system.components})
-
-
-def test_names_of_components_may_have_dots():
-    flat_system = load("fig4", "native")
-    system = inner(flat_system)
-    [loop] = loops_of(system)
-    named = {role: f"auv1.{name}" for role, name in vars(STANDARD).items()}
-    assert vars(loop) == named
-    found, flat = (simulate(one, stop_time=1.0) for one in (system, flat_system))
-    for key in ("l2_effort", "peak_command", "final_error", "velocities_reaching_controller"):
-        assert found.metrics()[key] == flat.metrics()[key]
-    assert (certificates(found, loop) == certificates(flat)).all()
-    reaching = velocities_reaching(inner(load("fig5-pd", "native")), loop)
-    assert reaching == [f"auv1.plant.dy.{axis}" for axis in "xyz"]
-
-
 def test_each_vehicle_is_drawn(results):
     names = {path.name for path in (results / "two").iterdir()}
     for name in ("plant", "tow"):
@@ -119,12 +95,10 @@ def test_each_vehicle_is_drawn(results):
             f"two-{name}{part}.{kind}" for part in ("", "-velocity") for kind in ("png", "svg")
         )
         assert names.issuperset(figures)
-    # Both together have one, and no second of what is of one vehicle.
+    # There is one figure of both together, and none of the others.
     assert "two.png" in names and "two-velocity.png" not in names
-    # What is drawn of one is not drawn of the other.
-    assert (
-        len({(results / "two" / f"two-{name}.png").read_bytes() for name in ("plant", "tow")}) == 2
-    )
+    one, other = ((results / "two" / f"two-{name}.png").read_bytes() for name in ("plant", "tow"))
+    assert one != other
 
 
 @needs_npm
@@ -137,41 +111,22 @@ def test_all_vehicles_are_on_one_page(results, capsys):
     assert [vehicle["name"] for vehicle in loop["vehicles"]] == ["plant", "tow"]
 
 
-def test_theorem_and_indices_are_said_of_each(results, capsys):
+def test_theorem_is_said_of_each(results):
     text = gain_check(load(results / "two.toml", "native"))
     assert text.startswith("plant:\n") and "\ntow:\n" in text
-    result = simulate(results / "two.toml", stop_time=1.0, kind="native")
-    assert result.metrics()[VEHICLES].keys() == {"plant", "tow"}
-
-
-def test_a_study_has_columns_of_each(results, tmp_path):
-    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
-    from orchestrator import sweep  # noqa: PLC0415
-
-    study = {
-        "scenario": str(results / "two.toml"), "stop_time": 2.0,
-        "vary": {"pilot.eps_t": [10.0, 30.0]},
-    }  # fmt: skip
-    result = sweep(study, kind="native", out=tmp_path / "s", workers=1)
-    columns = index_columns([STANDARD, OTHER])
-    assert set(columns) <= set(result)
-    assert len(set(result["plant.l2_effort.u"])) == 1
-    assert len(set(result["tow.l2_effort.u"])) == 2
-    assert np.isfinite(result["tow.late_error"]).all()
 
 
 # Vehicles that a scenario counts
 
 
-@pytest.mark.parametrize("kind", ["native", "python"])
-def test_one_vehicle_of_a_fleet_has_the_numbers_of_the_single_loop(kind):
-    single = simulate("fig4", stop_time=2.0, kind=kind)
-    of_fleet = simulate({"vehicles": 1}, stop_time=2.0, kind=kind)
+def test_one_vehicle_of_a_fleet_has_the_numbers_of_the_single_loop():
+    single = simulate("fig4", stop_time=1.0, kind="native")
+    of_fleet = simulate({"vehicles": 1}, stop_time=1.0, kind="native")
     assert of_fleet.columns == tuple(f"auv1.{name}" for name in single.columns)
     assert (of_fleet.rows == single.rows).all()
 
 
-def test_each_vehicle_of_a_fleet_has_the_numbers_that_it_has_alone():
+def test_each_vehicle_of_a_fleet_has_the_numbers_of_its_own_run():
     seeds = {"auv*.plant.noise.seed": {"first": 5, "step": 1}}
     three = simulate({"vehicles": 3, "parameters": seeds}, stop_time=1.0, kind="native")
     for number in (1, 2, 3):
@@ -183,7 +138,7 @@ def test_each_vehicle_of_a_fleet_has_the_numbers_that_it_has_alone():
 FLEET = """
 vehicles = 3
 figure = "comparison"
-stop_time = 2.0
+stop_time = 1.5
 
 [components]
 lead = "MotionPlanner"
@@ -203,7 +158,7 @@ components."auv*.controller" = "PdController"
 wires."auv*.controller.dy" = "auv*.plant.dy"
 
 [[events]]
-at = 1.0
+at = 0.5
 override = { "auv*.controller.tau.u" = 0.0 }
 """
 
@@ -230,31 +185,23 @@ def test_a_star_in_a_scenario_is_each_vehicle(fleet):
     assert loops_of(system)[1] == Loop("auv2.plant", "auv2.controller", "lead", "auv2.disturbance")
 
 
-def test_a_fleet_is_compared_with_another_controller_in_its_place(fleet, tmp_path):
-    pytest.importorskip("matplotlib")
-    assert main(["run", str(fleet / "fleet.toml"), "--kind", "native", "--out", str(tmp_path)]) == 0
-    columns = [
-        path.read_text(encoding="utf-8").partition("\n")[0].split(",")
-        for path in (tmp_path / "result.csv", tmp_path / "fleet-pd" / "result.csv")
-    ]
-    assert "auv1.disturbance.tau_w.u" not in {*columns[0], *columns[1]}
-    assert "auv3.controller.dy.x" in columns[1] and "lead.y_d.x" in columns[1]
-    tables = [
-        np.genfromtxt(folder / "result.csv", delimiter=",", names=True, deletechars="")
-        for folder in (tmp_path, tmp_path / "fleet-pd")
-    ]
-    for table in tables:
-        is_after = table["time"] > 1.01
+def test_a_fleet_is_compared_with_another_controller(fleet, tmp_path):
+    options = ["--kind", "native", "--no-figures", "--out", str(tmp_path)]
+    assert main(["run", str(fleet / "fleet.toml"), *options]) == 0
+    for folder, is_pd in ((tmp_path, False), (tmp_path / "fleet-pd", True)):
+        table = np.genfromtxt(folder / "result.csv", delimiter=",", names=True, deletechars="")
+        names = table.dtype.names
+        assert "auv1.disturbance.tau_w.u" not in names and "lead.y_d.x" in names
+        assert ("auv3.controller.dy.x" in names) == is_pd
+        is_after = table["time"] > 0.51
         for number in (1, 2, 3):
             assert (table[f"auv{number}.plant.tau.u"][is_after] == 0.0).all()
-        # Rows of positions of three vehicles, taken apart without the code under test.
+        # Positions of three vehicles, taken apart without the code under test.
         places = np.array([[table[f"auv{i}.plant.eta.{k}"] for k in "xyz"] for i in (1, 2, 3)])
-        apart = [np.linalg.norm(places[i] - places[j], axis=0) for i, j in ((0, 1), (0, 2), (1, 2))]
-        folder = tmp_path if table is tables[0] else tmp_path / "fleet-pd"
+        apart = [np.linalg.norm(a - b, axis=0) for a, b in combinations(places, 2)]
         metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
         assert metrics["smallest_distance"] == pytest.approx(np.min(apart), rel=1e-12)
         assert metrics[VEHICLES].keys() == {"auv1", "auv2", "auv3"}
-    assert {"fleet.png", "fleet-auv1.png", "fleet-auv3.svg"} <= {p.name for p in tmp_path.iterdir()}
 
 
 def test_many_vehicles_have_only_one_figure_together(tmp_path, capsys):
