@@ -230,7 +230,7 @@ def one_figure(name: str, title: str, runs: Sequence[Drawn], vehicle: str = "") 
 
 
 def _with_vehicle(runs: Sequence[Drawn], loop: Loop) -> list[Drawn]:
-    """Return runs with one loop each: that of the same name as `loop`, else of the same number."""
+    """Return runs with one loop each, which has the name of `loop`, else its number."""
     i = runs[0].loops.index(loop)
     return [
         run._replace(
