@@ -16,7 +16,7 @@ from fmus.native.emit import quoted
 from fmus.native.names import RUNTIME
 from fmus.native.tables import tables
 from fmus.native.translator import translated
-from fmus.ports.definition import Definition, Model
+from fmus.ports.definition import Model
 from fmus.ports.description import (
     SOURCES,
     fmi2_description,
@@ -73,13 +73,6 @@ def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
         "terminalsAndIcons/icon.png": icon,
         "terminalsAndIcons/terminal.png": (_FOLDER / "terminal.png").read_bytes(),
     }
-
-
-def sources(
-    definition: Definition, fmi: str = FMI_VERSIONS[0], arrays: bool = False
-) -> dict[str, str]:
-    """Return the C sources of a component by their file names, except identity.h."""
-    return sources_of(translated(definition), tables(definition, arrays), fmi)
 
 
 def sources_of(equations: str, ports: str, fmi: str) -> dict[str, str]:

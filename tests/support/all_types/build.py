@@ -8,7 +8,9 @@ from pathlib import Path
 import fmpy
 
 from fmus.discovery import write_archive
-from fmus.native.packaging import sources
+from fmus.native.packaging import sources_of
+from fmus.native.tables import tables
+from fmus.native.translator import translated
 from fmus.ports.definition import Definition, define
 from fmus.ports.description import SOURCES, fmi2_description, fmi3_description
 from fmus.python.packaging import fmu_entries, seal
@@ -40,6 +42,11 @@ _DESCRIBE = {"2": fmi2_description, "3": fmi3_description}
 def definition(variant: str = "read") -> Definition:
     """Definition of a variant of the component."""
     return define(NAME, VARIANTS[variant])
+
+
+def sources(definition: Definition, fmi: str = "2") -> dict[str, str]:
+    """Return the C sources of a component by their file names, except identity.h."""
+    return sources_of(translated(definition), tables(definition), fmi)
 
 
 def native(

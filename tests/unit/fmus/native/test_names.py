@@ -20,8 +20,8 @@ from fmus.language.tree import Constant, Do, Function
 from fmus.language.types import FLOAT, INT, Array, Record, type_of
 from fmus.native.emit import Emitter
 from fmus.native.names import in_c
-from fmus.native.packaging import sources
 from orchestrator.machine.compilers import SAME_NUMBERS, machines_compiler
+from support.all_types.build import sources
 
 ZIG = (sys.executable, "-m", "ziglang", "cc", "-target")
 COMMANDS = {

@@ -10,6 +10,7 @@ from fmus.discovery import source_of
 from fmus.native import packaging
 from fmus.native.packaging import fmu_entries
 from orchestrator.machine.compilers import Compiler, platforms
+from support.all_types.build import sources
 from support.settings import NAMES, REPRESENTATIVES
 
 PLANT = source_of("AuvPlant").definition
@@ -75,7 +76,7 @@ def test_guid_is_the_same_for_all_platforms():
 
 def test_guid_follows_from_sources_and_description(monkeypatch: pytest.MonkeyPatch):
     guids = {guid(entries(name, fmi)) for name in NAMES for fmi in FILES}
-    files, written = packaging.sources(PLANT), packaging.sources_of
+    files, written = sources(PLANT), packaging.sources_of
     for file in files:
 
         def changed(*parts: str, file: str = file) -> dict[str, str]:

@@ -18,11 +18,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from fmus.discovery import source_of
-from fmus.native.packaging import sources
 from fmus.native.translator import _directives
 from fmus.ports.behaviour import NUMBER_FORMAT
 from fmus.ports.description import SOURCES
 from fmus.python.component import LONGEST_MESSAGE
+from support.all_types.build import sources
 from support.language import HEAD, Twins, module_of
 from support.settings import NAMES
 
@@ -42,6 +42,7 @@ POWERS_OF_TWO = [ldexp(1.0, exponent) for exponent in range(-1074, 1024)]
 every_double = st.integers(0, 2**64 - 1).map(
     lambda bits: struct.unpack("<d", struct.pack("<Q", bits))[0]
 )
+
 usual_double = st.floats(-1e7, 1e7) | st.floats(-1e-3, 1e-3) | st.integers(-(10**17), 10**17)
 
 
