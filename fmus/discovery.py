@@ -91,7 +91,7 @@ class Source(NamedTuple):
 
     @property
     def page(self) -> str:
-        """Description by its author, in Markdown, without ports: from `page.md` or the docstring."""
+        """Description in Markdown, without ports, from `page.md` or the docstring of the module."""
         page = self.folder / "page.md"
         if self.root is None and page.is_file():
             return _PORTS.sub("", page.read_text(encoding="utf-8")).strip()
