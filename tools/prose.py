@@ -143,7 +143,9 @@ def all_pages() -> Iterator[Page]:
 
 
 def html_blocks(text: str) -> Iterator[Block]:
-    """Yield the texts between the tags of a page."""
+    """Yield the texts between the tags of a page, without styles and scripts."""
+    for within in (r"<style.*?</style>", r"<script.*?</script>"):
+        text = re.sub(within, lambda code: "\n" * code[0].count("\n"), text, flags=re.DOTALL)
     for between in re.finditer(r">([^<>]*\w\s+\w[^<>]*)<", text):
         yield Block(1 + text.count("\n", 0, between.start(1)), between[1], False)
 

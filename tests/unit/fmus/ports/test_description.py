@@ -256,7 +256,7 @@ def test_build_description_names_the_one_file():
     assert named == [*TARGETS], "each machine that libraries are built for, once"
 
 
-def test_arrays_depend_on_all_that_their_elements_do():
+def test_arrays_have_the_dependencies_of_their_elements():
     arrays = [Array(name, f"The {name}", (2,)) for name in "uy"]
     ports = (
         *(Port(f"u.{k}", "input", *REAL, f"The u: {k}", "m", 0.5, array=arrays[0]) for k in "ab"),

@@ -22,7 +22,7 @@ def terminals() -> list[ElementTree.Element]:
     return [*ElementTree.fromstring(terminals_of({"": GROUPS})).iterfind("Terminals/Terminal")]
 
 
-def test_groups_of_inputs_and_outputs_alone_are_terminals():
+def test_only_groups_of_inputs_and_outputs_are_terminals():
     assert [
         (
             terminal.get("name"),
