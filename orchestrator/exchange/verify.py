@@ -295,9 +295,10 @@ class _Samples:
 
     def take(self, rows: np.ndarray) -> None:
         """Take the samples that lie between some rows."""
-        rows = np.vstack((self._last, rows))
+        rows = rows.copy()
         for name in self._integers:
             rows[:, self._header.place[name]] = self._header.values(name, rows)
+        rows = np.vstack((self._last, rows))
         self._sample(rows, int(np.searchsorted(self._times, rows[-1, 0], side="right")))
         self._last = rows[-1:].copy()
 

@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -285,6 +286,16 @@ def test_a_table_with_every_type_is_verified(fmu: Path, tmp_path: Path):
     with pytest.raises(InputError) as error:
         verify(table, system, 0.0)
     assert mentions(str(error.value), "line 3 0.125")
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_large_integers_are_verified_in_blocks_of_any_size(fmu: Path, tmp_path: Path, rows: int):
+    """On a busy machine observers get rows in small blocks."""
+    values = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
+    system = replace(typed.system_of(fmu, parameters=values), step=H)
+    table = simulate(system, stop_time=4 * H).save(tmp_path) / "result.csv"
+    with patch("orchestrator.cosim.observers._ROWS", rows):
+        verify(table, system, 0.0)
 
 
 @pytest.mark.parametrize("ending", TABLES)
