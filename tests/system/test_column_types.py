@@ -11,6 +11,7 @@ from importlib.util import find_spec
 from math import inf
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -20,6 +21,7 @@ from hypothesis import strategies as st
 from orchestrator import Result, read, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim import Connection, Linear, Mapped, PortName, Value, read_ssp, write_ssp
+from orchestrator.exchange.verify import verify
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from support import typed
@@ -262,3 +264,13 @@ def test_a_mapping_to_what_its_target_cannot_hold_is_refused_by_its_number(fmu: 
     ends = PortName.read(f"a.y_{kind}"), PortName.read(f"b.u_{kind}")
     system = replace(system, connections=(Connection(*ends, Mapped(((0, target),))),))
     assert mentions(" ".join(map(str, system.problems())), f"{target} {kind}")
+
+
+@pytest.mark.parametrize("rows", [1, 3])
+def test_large_integers_are_verified_in_blocks_of_any_size(fmu: Path, tmp_path: Path, rows: int):
+    """On a busy machine observers get rows in small blocks."""
+    values = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
+    system = replace(typed.system_of(fmu, parameters=values), step=H)
+    table = simulate(system, stop_time=4 * H).save(tmp_path) / "result.csv"
+    with patch("orchestrator.cosim.observers._ROWS", rows):
+        verify(table, system, 0.0)
