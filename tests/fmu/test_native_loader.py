@@ -11,6 +11,7 @@ from shutil import copytree
 import fmpy
 import pytest
 
+from fmus.kinds import PYTHON
 from fmus.python.packaging import LOADER, LOADER_FLAGS, build_script, loader_compiler
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs import bundle
@@ -252,7 +253,7 @@ def test_sanitizers_find_nothing_whatever_a_host_calls(dist: Path, tmp_path: Pat
         assert "fatal 0," in process.stdout
 
 
-def test_plain_variant_is_there_on_request(plain: Path, dist: Path, tmp_path: Path, monkeypatch):
+def test_plain_variant_is_there_on_request(plain: Path, tmp_path: Path, monkeypatch):
     copytree(plain, tmp_path, dirs_exist_ok=True)
     assert bundle.settings_of(tmp_path)["loader"] == "plain"
     fmpy.extract(tmp_path / "AuvPlant.fmu", unzipdir=tmp_path / "unpacked")
@@ -260,8 +261,9 @@ def test_plain_variant_is_there_on_request(plain: Path, dist: Path, tmp_path: Pa
     assert [path.name for path in libraries.iterdir()] == ["AuvPlant.so"]
     fmpy.simulate_fmu(str(tmp_path / "AuvPlant.fmu"), stop_time=0.2)
     assert bundle.build_bundle(tmp_path) == [], "what is there stays as it is"
+    fmus = bundle.current_fmus(PYTHON)
     monkeypatch.setattr(
-        bundle, "run_fmus", lambda _, folder, *__, **___: copytree(dist, folder, dirs_exist_ok=True)
+        bundle, "run_fmus", lambda _, folder, *__, **___: copytree(fmus, folder, dirs_exist_ok=True)
     )
     written = bundle.build_bundle(tmp_path, loader="native")
     assert tmp_path / "AuvPlant.fmu" in written
