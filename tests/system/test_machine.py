@@ -63,7 +63,7 @@ def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending
     """There is room for some of a million rows."""
     if ending == "parquet":
         pytest.importorskip("pyarrow", reason="needs the extra `parquet`")
-    with small_disk(workplace / "disk", 3_000_000) as disk:
+    with small_disk(workplace / "disk", 14_000_000) as disk:
         out = ["--out", str(disk / "r"), "--format", ending, "--loop", loop]
         assert main([*RUN, "0.1", *out]) == 0
         before = contents(disk)
@@ -77,7 +77,7 @@ def test_full_disk_ends_a_run_early_and_keeps_the_rows(workplace, capsys, ending
         incomplete = disk / "r" / "incomplete"
         assert {name: after[name] for name in after if "incomplete" not in name} == before
         kept = rows(incomplete, ending)
-        assert len(kept) > 100
+        assert len(kept) > 1000
         assert np.array_equal(kept, simulate("fig4", stop_time=(len(kept) - 1) * 0.02).rows)
         assert read_result(incomplete)[1].failure == why.removeprefix("auv-fmu: fig4 ")
 
