@@ -39,13 +39,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Result", "StudyResult", "load", "read", "simulate", "sweep"]
 
-__getattr__, __dir__ = offered(
-    __name__,
-    {
-        "runs.preparation": "load",
-        "runs.result": "Result read",
-        "runs.run": "simulate",
-        "studies.store": "StudyResult",
-        "studies.sweep": "sweep",
-    },
-)
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = offered(
+        __name__,
+        {
+            "runs.preparation": "load",
+            "runs.result": "Result read",
+            "runs.run": "simulate",
+            "studies.store": "StudyResult",
+            "studies.sweep": "sweep",
+        },
+    )

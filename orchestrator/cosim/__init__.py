@@ -97,5 +97,6 @@ _MODULES = {
     "variables": "Value Variable",
 }
 
-__getattr__, __dir__ = offered(__name__, _MODULES)
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = offered(__name__, _MODULES)
 __all__ = [*" ".join(_MODULES.values()).split()]  # noqa: PLE0604
