@@ -25,7 +25,7 @@ from uuid import uuid4
 import numpy as np
 
 from orchestrator.cosim.fmi.instance import Log
-from orchestrator.cosim.hooks import NEVER, Lasting, Run
+from orchestrator.cosim.hooks import NEVER, Stateful, Run
 from orchestrator.cosim.observers import Ending, Header, NotKept
 from orchestrator.machine.disk import move_aside, sealed, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
@@ -339,7 +339,7 @@ class Checkpoints:
                     name: b64encode(instance.state()).decode()
                     for name, instance in run.instances.items()
                 },
-                lasting=[one.state() for one in _lasting(run)],
+                lasting=[one.state() for one in _stateful(run)],
             )
         except OSError as error:
             raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
@@ -355,7 +355,7 @@ class Checkpoints:
 
     def _resume(self, run: Run, stored: _Stored) -> None:
         # The meaning of rows is restored first: observers that get them need it.
-        for one, state in zip(_lasting(run), stored.lasting, strict=True):
+        for one, state in zip(_stateful(run), stored.lasting, strict=True):
             one.restore(state)
         first = run.blocks.count  # computed again
         for rows in self._row_log.kept():
@@ -369,8 +369,8 @@ class Checkpoints:
             instance.restore(b64decode(stored.states[name]))
 
 
-def _lasting(run: Run) -> list[Lasting]:
-    hooks = [one for one in run.hooks if isinstance(one, Lasting)]
+def _stateful(run: Run) -> list[Stateful]:
+    hooks = [hook for hook in run.hooks if isinstance(hook, Stateful)]
     return [run.row.strings, run.overrides, run.log, *hooks]
 
 

@@ -138,7 +138,7 @@ class Hook(Protocol):
 
 
 @runtime_checkable
-class Lasting(Protocol):
+class Stateful(Protocol):
     """Keeps a state that a resumed run needs.
 
     Such a hook remembers what it has done and still has to do.
