@@ -96,13 +96,13 @@ def _vehicles(run: Drawn) -> list[Loop]:
 
 
 def _drawn(run: Drawn) -> Iterator[str]:
-    """Yield notes on the size of the drawn vehicles and on skipped parts."""
+    """Yield notes on the size of the drawn vehicles and on parts that are left out."""
     yield "Vehicles are drawn larger than they are"
     for loop in run.loops:
         of_vehicle = f"{loop.name}: " if len(run.loops) > 1 else ""
         for name, needs in _SHOWN.items():
             if missing := run.result.missing(*needs(loop)):
-                yield f"{of_vehicle}{name} skipped: no {missing[0]}"
+                yield f"{of_vehicle}{name} left out: the run has no {missing[0]}"
 
 
 def _endings(runs: Sequence[Drawn]) -> Iterator[str]:

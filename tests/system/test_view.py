@@ -103,10 +103,10 @@ def test_indices_equal_the_result():
 
 def test_missing_columns_are_named_on_the_page():
     text = page_of(Drawn("run", loop_table(without=STANDARD.theta_hat)))
-    assert "estimated parameters skipped: no controller.theta_hat[1]" in text
+    assert "estimated parameters left out: the run has no controller.theta_hat[1]" in text
     loops = fleet(3)
     text = page_of(Drawn("run", fleet_table(3, without=loops[2].posture), loops=loops))
-    assert "auv3: path skipped: no auv3.plant.eta.x" in text
+    assert "auv3: path left out: the run has no auv3.plant.eta.x" in text
     [loop] = stored(text)[0]["loops"]
     assert [vehicle["name"] for vehicle in loop["vehicles"]] == ["auv1", "auv2"]
 
