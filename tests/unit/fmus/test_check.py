@@ -20,7 +20,7 @@ from support.own import called, write
 def mistakes(tmp_path, monkeypatch):
     """The exit status of `fmus.check` in a folder, and its lines."""
     monkeypatch.chdir(tmp_path)
-    for name in ("own_lag", "beside"):
+    for name in ("own_lag", "own_index", "own", "beside"):
         monkeypatch.delitem(sys.modules, name, raising=False)
 
     def checked(*arguments: object) -> tuple[int, list[str]]:
@@ -164,7 +164,7 @@ def test_byte_code_beside_a_component_is_neither_believed_nor_written(tmp_path, 
     write(tmp_path, ("from math import expm1", "from beside import expm1"))
     (tmp_path / "beside.py").write_text("from math import expm1\n")
     (tmp_path / "other.py").write_text("raise SystemExit('other code')\n")
-    for name in ("own_lag", "beside"):
+    for name in ("own_lag", "own_index", "own", "beside"):
         py_compile.compile(
             str(tmp_path / "other.py"),
             cache_from_source(str(tmp_path / f"{name}.py")),
