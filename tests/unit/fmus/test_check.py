@@ -20,7 +20,7 @@ from support.own import called, write
 def mistakes(tmp_path, monkeypatch):
     """The exit status of `fmus.check` in a folder, and its lines."""
     monkeypatch.chdir(tmp_path)
-    for name in ("own_lag", "beside"):
+    for name in ("own_lag", "own_index", "own", "beside"):
         monkeypatch.delitem(sys.modules, name, raising=False)
 
     def checked(*arguments: object) -> tuple[int, list[str]]:

@@ -19,7 +19,7 @@ SLAVE = "from pythonfmu import Fmi2Slave\n\n\nclass Own(Fmi2Slave):\n    pass\n"
 @pytest.fixture
 def built(tmp_path, monkeypatch):
     """The exit status of `fmus.build`, and its errors."""
-    for name in ("own_lag", "beside"):
+    for name in ("own_lag", "own_slave", "beside"):
         monkeypatch.delitem(sys.modules, name, raising=False)
 
     def call(*arguments: object) -> tuple[int, str]:
