@@ -35,7 +35,8 @@ def test_every_process_writes_the_same():
 @pytest.mark.parametrize("name", NAMES)
 def test_it_has_no_memory_and_no_variable_outside_of_functions(name):
     text = translated(source_of(name).definition)
-    assert not re.search(r"\b(malloc|calloc|realloc|free|alloca)\b", text)
+    code = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+    assert not re.search(r"\b(malloc|calloc|realloc|free|alloca)\b", code)
     outside = [
         line for line in text.splitlines() if re.match(r"static (?!const\b).*[^{;]*=.*;", line)
     ]
