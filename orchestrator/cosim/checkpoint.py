@@ -25,7 +25,7 @@ from uuid import uuid4
 import numpy as np
 
 from orchestrator.cosim.fmi.instance import Log
-from orchestrator.cosim.hooks import NEVER, Stateful, Run
+from orchestrator.cosim.hooks import NEVER, Run, Stateful
 from orchestrator.cosim.observers import Ending, Header, NotKept
 from orchestrator.machine.disk import move_aside, sealed, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason

@@ -798,7 +798,7 @@ def test_an_integer_that_c_cannot_hold_is_refused(
     ("line", "why"),
     [
         ("y = float(sum(k * a for k, a in enumerate(v, 1)))", "sum of floats is not in"),
-        ("for k, a in enumerate(v, int(y)): y += k * a", "enumerate with a start that is not a con"),
+        ("for k, a in enumerate(v, int(y)): y += k * a", "enumerate with a start that is not a c"),
         ("for a, b in zip(v, v, strict=True): y += a * b", "zip with strict="),
         ("for k in enumerate(v): y += k[1]", "enumerate without a name for each part"),
         ("y = max(y, v[1], key=abs)", "max with key="),
