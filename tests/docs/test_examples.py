@@ -27,6 +27,7 @@ from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import true_control_point
 from support.machine import contents
 from support.markdown import DOCS, blocks
+from support.tiers import slow
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
@@ -68,9 +69,10 @@ def executed(page: Path, capsys: pytest.CaptureFixture[str], number: int = 0) ->
 @pytest.mark.parametrize(
     ("page", "number"),
     [
-        (page, n)
+        case
         for page in (SCENARIOS, EVENTS, PARAMETERS)
-        for n in range(len(blocks(page, "toml")))
+        for first, *others in [[(page, n) for n in range(len(blocks(page, "toml")))]]
+        for case in (first, *slow(*others))
     ],
     ids=lambda value: getattr(value, "stem", value),
 )

@@ -96,9 +96,11 @@ def test_both_forms_give_the_same_motion(workplace: Path):
     "settings",
     [
         {"plant.noise.std": 0.1},
-        {"planner.eta0.z": -30.0},
-        {"plant.eta0.psi": 3.0},
-        {"controller.m": 0.0, "controller.d": 0.0},
+        *slow(
+            {"planner.eta0.z": -30.0},
+            {"plant.eta0.psi": 3.0},
+            {"controller.m": 0.0, "controller.d": 0.0},
+        ),
     ],
 )
 def test_law_to_begin_with_arrives_from_elsewhere(workplace: Path, settings: dict[str, float]):
@@ -127,9 +129,8 @@ def test_mistake_in_a_script_is_told_with_its_line(text, complaint, tmp_path, ca
 @pytest.mark.parametrize(
     ("options", "isolated"),
     [
-        (["--python"], []),
         ([], ["--isolate"]),
-        *slow((["--python"], ["--isolate"]), ([], [])),
+        *slow((["--python"], []), (["--python"], ["--isolate"]), ([], [])),
     ],
 )
 def test_mistake_in_a_step_is_told_once_with_its_line(options, isolated, workplace, capsys):
@@ -182,7 +183,7 @@ def test_mistake_in_the_first_step_is_the_only_message(workplace, capsys):
 
 @pytest.mark.parametrize(
     ("head", "mistake", "status"),
-    [("get()", "if self.filtered: nothing", 1), ("put(value)", "nothing", 2)],
+    [("get()", "if self.filtered: nothing", 1), *slow(("put(value)", "nothing", 2))],
 )
 def test_mistake_in_a_value_is_told_with_its_line(workplace, capsys, head, mistake, status):
     """While a plain slave gets or sets a value, where plain PythonFMU ends with fmi2Fatal."""

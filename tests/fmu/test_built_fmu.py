@@ -119,6 +119,7 @@ def test_no_run_begins_with_another_parameter(dist, tmp_path, name, parameter, v
             assert failure.value.status == fmi2Error
 
 
+@pytest.mark.slow
 def test_many_instances_leave_the_interpreter_as_it_was(dist: Path, tmp_path: Path):
     """References that PythonFMU takes too often are given back, and leaks are freed."""
     fmpy.extract(dist / "MotionPlanner.fmu", unzipdir=tmp_path)
@@ -195,6 +196,7 @@ def test_two_versions_of_the_bundle_run_their_own_code_in_one_process(dist, tmp_
         assert theirs.get("tau_w.u") == 2.0
 
 
+@pytest.mark.slow
 def test_same_sources_give_the_same_bytes(dist: Path, tmp_path: Path, sources: Path):
     build(tmp_path / "again", sources)
     for name in NAMES:

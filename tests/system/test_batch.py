@@ -30,6 +30,7 @@ from orchestrator.studies.study import read_study, ready_studies
 from support import largest_depth, others
 from support.runs import prepared, whole
 from support.texts import mentions
+from support.tiers import slow
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
@@ -76,7 +77,9 @@ def changes(values: Mapping[str, Any]) -> dict[Any, Any]:
     return {PortName.read(name): value for name, value in values.items()}
 
 
-@pytest.mark.parametrize("name", ready_studies())
+@pytest.mark.parametrize(
+    "name", ["attraction", "gains", *slow(*sorted({*ready_studies()} - {"attraction", "gains"}))]
+)
 def test_runs_of_studies_equal_the_fmus(name):
     """All indices are equal; the FMUs report why a run fails."""
     runs = sampled(name)
@@ -114,15 +117,16 @@ PLANTS_FIRST: Order = ("plant", "disturbance", "planner", "controller")
 
 
 @pytest.mark.parametrize(
-    ("name", "order"), [("fig4", None), ("fig5-pd", "jacobi"), ("path", "feedthrough"),
-                        ("sea", None), ("remus", "jacobi"), ("remus-pd", "feedthrough")]
+    ("name", "order"),
+    [("fig4", None), ("path", "feedthrough"), ("remus", "jacobi"),
+     *slow(("fig5-pd", "jacobi"), ("sea", None), ("remus-pd", "feedthrough"))]
 )  # fmt: skip
 def test_every_column_equals_the_fmus(name, order):
     compare_with_fmus(name, Point(0, name, NOISY, 4.01, 0.02, order))
 
 
 @pytest.mark.parametrize(
-    "order", ["feedthrough", "jacobi", PLANTS_FIRST, PLANTS_FIRST[::-1]], ids=str
+    "order", ["jacobi", PLANTS_FIRST, *slow("feedthrough", (PLANTS_FIRST[::-1],))], ids=str
 )
 def test_orders_equal_the_fmus(order):
     """One engine makes runs of all orders. An exact observer shows the gain of the step before."""
@@ -131,7 +135,7 @@ def test_orders_equal_the_fmus(order):
 
 
 @pytest.mark.parametrize(
-    ("name", "order"), [("formation-v", "feedthrough"), ("formation-change", "jacobi")]
+    ("name", "order"), [("formation-v", "feedthrough"), *slow(("formation-change", "jacobi"))]
 )
 def test_fleets_equal_the_fmus(name, order):
     """The smallest distance between vehicles is among the indices; a star means all of them."""
@@ -291,7 +295,7 @@ def test_an_fmu_of_another_tool_is_refused_by_name(tmp_path):
 # Engines
 
 
-@pytest.mark.parametrize("name", ["fig4", "formation-v"])
+@pytest.mark.parametrize("name", ["fig4", *slow("formation-v")])
 def test_a_users_index_is_the_same_in_both_engines(name):
     own = (OwnIndex("largest_depth", Path(largest_depth.__file__).read_bytes()),)
     run = Point(0, name, {}, 2.01, 0.02)

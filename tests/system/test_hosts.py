@@ -128,7 +128,7 @@ def test_a_value_waits_for_the_tool_in_components_that_it_passes_at_once(
     assert (after["clock.t"] - h - given) / h == LATE.get(host, (2, 2))[place]
 
 
-@pytest.mark.parametrize("host", ["ecos", "fmpy-ssp", *slow("libcosim-ssp", "libcosim-osp")])
+@pytest.mark.parametrize("host", ["fmpy-ssp", *slow("ecos", "libcosim-ssp", "libcosim-osp")])
 def test_vehicles_in_systems_have_our_numbers_in_other_hosts(dist: Path, host: str):
     """Some get a flat archive, since they do not read nested ones completely."""
     system = fleet(dist)
@@ -187,13 +187,15 @@ STD = {PortName("plant", "noise.std"): 0.5}
     ("host", "values", "changed", "words"),
     [
         ("libcosim-ssp", CHOICE, {}, "controller.saturation"),
-        ("libcosim-osp", CHOICE, {}, "controller.saturation"),
-        ("ecos", CHOICE, {}, "controller.saturation"),
         ("fmpy", STD, {}, "plant.noise.std = 0.5"),
-        ("fmpy-ssp", STD, {}, "plant.noise.std = 0.5"),
         ("fmpy", {}, {"start_time": 10.0}, "start time"),
         ("fmpy", {}, {"steps": {"controller": 0.06}}, "longer steps"),
-        ("ecos", {}, {"start_time": 10.0}, "at 10 s"),
+        *slow(
+            ("libcosim-osp", CHOICE, {}, "controller.saturation"),
+            ("ecos", CHOICE, {}, "controller.saturation"),
+            ("fmpy-ssp", STD, {}, "plant.noise.std = 0.5"),
+            ("ecos", {}, {"start_time": 10.0}, "at 10 s"),
+        ),
     ],
 )
 def test_host_refuses_what_it_does_not_apply(dist: Path, host: str, values, changed, words: str):

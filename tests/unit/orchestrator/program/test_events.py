@@ -29,6 +29,7 @@ from orchestrator.runs.preparation import Prepared, load_scenario, prepare, with
 from orchestrator.runs.request import Request
 from support.events import ALL, ENDS
 from support.programs import compiled, play
+from support.tiers import slow
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 
@@ -115,7 +116,7 @@ def occurrences(
         yield occurrence(events[number], number, time, listed[number], ends=bool(ends))
 
 
-@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("order", [ORDERS[0], *slow(*ORDERS[1:])])
 @pytest.mark.parametrize("last", ENDS)
 def test_events_of_all_kinds_do_what_they_do_to_fmus(last, order, tmp_path):
     scenario = tmp_path / "mine.toml"
@@ -124,7 +125,7 @@ def test_events_of_all_kinds_do_what_they_do_to_fmus(last, order, tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["current-step", "fault-sensor", "fault-thruster", "formation-lost-link"]
+    "name", ["fault-sensor", "fault-thruster", *slow("current-step", "formation-lost-link")]
 )
 def test_events_of_scenarios_do_what_they_do_to_fmus(name, tmp_path):
     for run in runs(name):

@@ -26,12 +26,13 @@ from orchestrator.runs.own_components import (
     new_controller,
 )
 from support.own import write
+from support.tiers import slow
 
 #: The controller of the closed loop, which is created with its FMU.
 OF_THE_LOOP = "controller of the loop"
 
 
-@pytest.fixture(params=[*LIKENESSES, OF_THE_LOOP])
+@pytest.fixture(params=[OF_THE_LOOP, LIKENESSES[0], *slow(*LIKENESSES[1:])])
 def made(request, tmp_path) -> Path:
     """Script of a component from a template."""
     if request.param == OF_THE_LOOP:
@@ -162,7 +163,7 @@ def test_controller_comes_with_its_fmu(tmp_path, monkeypatch, capsys, options, t
     }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["RainBarrel", "rain_barrel", "PIDController"])
+@pytest.mark.parametrize("name", ["PIDController", *slow("RainBarrel", "rain_barrel")])
 def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
     monkeypatch.chdir(tmp_path)
     folder = "pid_controller" if name == "PIDController" else "rain_barrel"
