@@ -72,7 +72,7 @@ def read_rows(
                 for batch in file.iter_batches(ROWS_AT_ONCE):
                     named = zip(batch.schema.names, batch.columns, strict=True)
                     columns = [_numbers(column, numbers.get(name)) for name, column in named]
-                    yield np.column_stack(columns).astype(float, copy=False)
+                    yield _with_times(np.column_stack(columns).astype(float, copy=False))
             return
         # Texts may have ends of lines in them, also of other systems, and empty lines.
         with open_lines(path, newline="" if numbers else None) as lines:
@@ -84,7 +84,14 @@ def read_rows(
                 rows = _loaded(chain([first], filled), converters)
                 if rows.shape[1] != len(header):
                     raise ValueError(f"rows of {rows.shape[1]} values for {len(header)} columns")
-                yield rows
+                yield _with_times(rows)
+
+
+def _with_times(rows: np.ndarray) -> np.ndarray:
+    """Return rows, whose times must be finite."""
+    if not np.isfinite(rows[:, 0]).all():
+        raise ValueError("a time is not finite")
+    return rows
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from orchestrator.runs.tables import read_columns, read_rows
         ("x,y\n1,2\n", "first column is 'x'"),
         ("time,a\n1,2\n3\n", "columns changed"),
         ("time,a\n1,2,3\n4,5,6\n", "rows of 3 values for 2 columns"),
+        ("time,a\n0,1\ninf,2\n", "a time is not finite"),
         ("time,a\n1,much\n", "much"),
         ("time,a\n\xff\n", "decode"),
     ],
