@@ -147,8 +147,8 @@ def _misread(file: Path) -> Iterator[str]:
         for name in sorted(element.attrib.keys() & (_INTEGERS | _REALS)):
             text = element.attrib[name]
             try:
-                for one in text.split() if name in _LISTS else [text]:
-                    (integer if name in _INTEGERS else real)(one)
+                for number in text.split() if name in _LISTS else [text]:
+                    (integer if name in _INTEGERS else real)(number)
             except ValueError:
                 shown = shortened(repr(text))
                 yield f"{name} of <{element.tag}> is {shown}, which is not a number"
