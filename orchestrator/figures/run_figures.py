@@ -183,7 +183,7 @@ def _draw_lines(
         if run == 0:
             axes.plot(time, column, color=COLOURS[i], linestyle=STYLES[i], label=label)
         else:
-            legend = "legend run" if (run, i) == (1, 0) else None
+            legend = "other run" if (run, i) == (1, 0) else None
             axes.plot(time, column, color="black", linewidth=0.7, label=legend)
 
 

@@ -428,7 +428,7 @@ def _keep_files(ledger: Ledger) -> str:
         (ledger.staging / RECORD).unlink(missing_ok=True)
         place = ledger.staging.rename(_free_place(ledger.folder))
     except OSError as error:
-        return f"; nor can the files be place: {reason(error)}"
+        return f"; nor can the files be kept: {reason(error)}"
     return f"; what was written is in {place}"
 
 
