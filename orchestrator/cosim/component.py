@@ -108,8 +108,8 @@ def described(fmu: Path, folder: Path) -> Described:
             _, root = next(ElementTree.iterparse(source, ["start"]))
         version = root.get("fmiVersion")
         if version not in _VERSIONS:
-            wanted = " or ".join(_VERSIONS)
-            raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {wanted} are supported")
+            usable = " or ".join(_VERSIONS)
+            raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {usable} are supported")
         read = read_description(folder)
     except InputError:
         raise

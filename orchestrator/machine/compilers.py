@@ -364,9 +364,9 @@ def find_library(category: str, key: str, function: str) -> CDLL | None:
     """Load a library from the cache; None if there is none that has the function."""
     with suppress(OSError):
         for place in read_cached(category, key):
-            library = CDLL(str(place))
-            if hasattr(library, function):
-                return library
+            loaded = CDLL(str(place))
+            if hasattr(loaded, function):
+                return loaded
     return None
 
 
