@@ -143,8 +143,8 @@ def _plot(options: argparse.Namespace) -> int:
     patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
-    wanted = partial(wanted_columns, patterns=patterns)
-    runs = _named([read_result(path, wanted) for path in paths], paths)
+    columns = partial(wanted_columns, patterns=patterns)
+    runs = _named([read_result(path, columns) for path in paths], paths)
     figure = plot(told_apart(runs, paths), patterns)
     with _written(options.out, options.force) as folder:
         save(figure, folder / options.out.name)

@@ -47,8 +47,8 @@ def add_run(parser: argparse.ArgumentParser) -> None:
 
 
 def _run(options: argparse.Namespace) -> int:
-    wanted = request(options)
-    runs = with_companion(prepare(*read_system(options), wanted), wanted)
+    run_request = request(options)
+    runs = with_companion(prepare(*read_system(options), run_request), run_request)
     files, findings = from_options(Files, options), Findings(options.strict)
     for prepared in runs:
         for doubt in prepared.doubts():

@@ -339,7 +339,7 @@ class Checkpoints:
                     name: b64encode(instance.state()).decode()
                     for name, instance in run.instances.items()
                 },
-                lasting=[one.state() for one in _stateful(run)],
+                lasting=[part.state() for part in _stateful(run)],
             )
         except OSError as error:
             raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
@@ -355,8 +355,8 @@ class Checkpoints:
 
     def _resume(self, run: Run, stored: _Stored) -> None:
         # The meaning of rows is restored first: observers that get them need it.
-        for one, state in zip(_stateful(run), stored.lasting, strict=True):
-            one.restore(state)
+        for part, state in zip(_stateful(run), stored.lasting, strict=True):
+            part.restore(state)
         first = run.blocks.count  # computed again
         for rows in self._row_log.kept():
             run.blocks.tell(rows[first:])

@@ -108,8 +108,8 @@ def described(fmu: Path, folder: Path) -> Described:
             _, root = next(ElementTree.iterparse(source, ["start"]))
         version = root.get("fmiVersion")
         if version not in _VERSIONS:
-            wanted = " or ".join(_VERSIONS)
-            raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {wanted} are supported")
+            usable = " or ".join(_VERSIONS)
+            raise InputError(f"{fmu}: is of FMI {version}; only FMUs of FMI {usable} are supported")
         read = read_description(folder)
     except InputError:
         raise
@@ -147,8 +147,8 @@ def _misread(file: Path) -> Iterator[str]:
         for name in sorted(element.attrib.keys() & (_INTEGERS | _REALS)):
             text = element.attrib[name]
             try:
-                for one in text.split() if name in _LISTS else [text]:
-                    (integer if name in _INTEGERS else real)(one)
+                for number in text.split() if name in _LISTS else [text]:
+                    (integer if name in _INTEGERS else real)(number)
             except ValueError:
                 shown = shortened(repr(text))
                 yield f"{name} of <{element.tag}> is {shown}, which is not a number"

@@ -54,7 +54,7 @@ class PortName:
 def likely_port(name: PortName, components: Collection[str]) -> PortName:
     """Split a name that begins with no component after the systems that it begins with."""
     outer, inner = name.component, name.port
-    while "." in inner and any(one.startswith(f"{outer}.") for one in components):
+    while "." in inner and any(component.startswith(f"{outer}.") for component in components):
         part, _, inner = inner.partition(".")
         outer = f"{outer}.{part}"
     return PortName(outer, inner)
@@ -252,13 +252,17 @@ class Connection:
             InputError: the terminals do not fit.
 
         """
-        for one, other in ((end, begin), (begin, end)):
-            if one.rule not in (*COMPLETE, BUS):
-                raise InputError(f"the matching rule {one.rule!r} of a terminal is not supported")
-            if one.flows:
-                raise InputError(f"{listed(one.flows)} of a terminal: only signals are supported")
-            missing = [member for member in one.members if member not in other.members]
-            if one.rule in COMPLETE and missing:
+        for terminal, partner in ((end, begin), (begin, end)):
+            if terminal.rule not in (*COMPLETE, BUS):
+                raise InputError(
+                    f"the matching rule {terminal.rule!r} of a terminal is not supported"
+                )
+            if terminal.flows:
+                raise InputError(
+                    f"{listed(terminal.flows)} of a terminal: only signals are supported"
+                )
+            missing = [member for member in terminal.members if member not in partner.members]
+            if terminal.rule in COMPLETE and missing:
                 raise InputError(f"a terminal lacks the member {listed(missing)}")
         for member in (member for member in end.members if member in begin.members):
             targets, sources = (
@@ -294,10 +298,10 @@ def check_connection(connection: Connection, component: Callable[[str], Componen
     source, target = connection.source, connection.target
     starts, ends = component(source.component), component(target.component)
     a, b = starts.variable(source.port), ends.variable(target.port)
-    for end, variable, wanted in ((source, a, "output"), (target, b, "input")):
-        if variable.causality != wanted:
+    for end, variable, causality in ((source, a, "output"), (target, b, "input")):
+        if variable.causality != causality:
             raise InputError(
-                f"{source} -> {target}: {end} has causality {variable.causality}, not {wanted}"
+                f"{source} -> {target}: {end} has causality {variable.causality}, not {causality}"
             )
     if not can_feed(a, b):
         raise InputError(f"{source} -> {target}: cannot feed {a.type} into {b.type}")

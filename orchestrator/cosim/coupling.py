@@ -312,12 +312,12 @@ class Coupling:
 
     def _read_ahead(self, places: Mapping[str, int]) -> None:
         """Read outputs that feed a component which is initialised before their own."""
-        wanted: dict[str, dict[str, None]] = {}
+        outputs: dict[str, dict[str, None]] = {}
         for connection in self._system.connections:
             source, target = connection.source, connection.target
             if places[source.component] >= places[target.component]:
-                wanted.setdefault(source.component, {})[source.port] = None
-        for name, ports in wanted.items():
+                outputs.setdefault(source.component, {})[source.port] = None
+        for name, ports in outputs.items():
             self._enter(name, list(ports))
 
     def _enter(self, name: str, ports: Sequence[str]) -> None:

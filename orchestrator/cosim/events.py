@@ -358,7 +358,7 @@ class Events:
         progress, layers, happened = state
         self._progress = [_Progress(*progress_of) for progress_of in progress]
         self._layers.restore(layers)
-        self._happened = [Occurrence(*one) for one in happened]
+        self._happened = [Occurrence(*fields) for fields in happened]
 
     def _begins(self, run: Run, number: int) -> bool:
         event, progress_of = self._events[number], self._progress[number]

@@ -194,9 +194,9 @@ class InputTable:
         linear: Sequence[bool],
     ) -> InputTable:
         """Make a table of columns, each in its type."""
-        exact = {place: one for place, one in enumerate(columns) if one.dtype.kind != "f"}
+        exact = {place: column for place, column in enumerate(columns) if column.dtype.kind != "f"}
         nothing = np.zeros(len(times))
-        values = [nothing if place in exact else one for place, one in enumerate(columns)]
+        values = [nothing if place in exact else column for place, column in enumerate(columns)]
         return cls(targets, times, np.column_stack(values), np.array(linear), exact)
 
     @property

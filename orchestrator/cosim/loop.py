@@ -268,12 +268,12 @@ PYTHON_LOOP = Stepping("python", step_interpreted)
 
 
 def choose_loop(
-    wanted: str, experiment: Experiment, isolation: Isolation | None = None
+    choice: str, experiment: Experiment, isolation: Isolation | None = None
 ) -> Stepping:
     """Choose the loop for a run.
 
     Args:
-        wanted: `auto`, `python` or `compiled`.
+        choice: `auto`, `python` or `compiled`.
         experiment: of the run.
         isolation: of the FMUs, whose functions are then not in this process.
 
@@ -281,13 +281,13 @@ def choose_loop(
         InputError: the compiled loop is not available.
 
     """
-    if wanted == "compiled":
+    if choice == "compiled":
         if isolation:
             raise InputError(
                 "the compiled loop cannot step isolated FMUs: drop --loop compiled or --isolate"
             )
         return _compiled(load_stepper() or compile_stepper())
-    if wanted == "auto" and not isolation and experiment.rows > _SET_UP:
+    if choice == "auto" and not isolation and experiment.rows > _SET_UP:
         if library := load_stepper():
             return _compiled(library)
         if experiment.rows > _COMPILED:

@@ -334,10 +334,10 @@ class Selection:
 
     def begin(self, header: Header) -> None:
         """Find the columns."""
-        kept = header.columns if self._columns is None else tuple(self._columns)
+        columns = header.columns if self._columns is None else tuple(self._columns)
         self._every = header.every(self._interval)
-        self._places = [0, *(header.place[name] for name in kept)]
-        self._observer.begin(replace(header, columns=kept))
+        self._places = [0, *(header.place[name] for name in columns)]
+        self._observer.begin(replace(header, columns=columns))
 
     def take(self, rows: np.ndarray) -> None:
         """Pass on the rows that are kept."""

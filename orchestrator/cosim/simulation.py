@@ -132,14 +132,14 @@ def _parameters(
     """
     parameters: dict[PortName, object] = {}
     for name, instance in instances.items():
-        component, wanted = system.components[name], system.parameters_of(name)
+        component, values = system.components[name], system.parameters_of(name)
         own = [variable.name for variable in component.having("parameter")]
-        lasting = [port for port in wanted if component.variables[port].initial == "exact"]
+        lasting = [port for port in values if component.variables[port].initial == "exact"]
         held = instance.read(list(dict.fromkeys((*own, *lasting))))
         for port in lasting:
-            if not same(wanted[port], held[port]):
+            if not same(values[port], held[port]):
                 log.remark(
-                    f"{name}.{port} was set to {literal(wanted[port])}, but the FMU holds "
+                    f"{name}.{port} was set to {literal(values[port])}, but the FMU holds "
                     f"{literal(held[port])}"
                 )
         parameters |= {

@@ -115,7 +115,11 @@ class Arrangement(NamedTuple):
         for name, sources in late.items():
             text = f"{name} takes {shortened(', '.join(map(str, sources)))} one step late: "
             concerned = (name, *(source.component for source in sources))
-            why = next((reasons[one] for one in concerned if one in reasons), "") if reasons else ""
+            why = (
+                next((reasons[component] for component in concerned if component in reasons), "")
+                if reasons
+                else ""
+            )
             texts.append(f"{text}direct feedthroughs form a ring{why and f'; {why}'}")
         return texts
 
@@ -203,8 +207,8 @@ class Visit(NamedTuple):
             return {*feedthroughs}
         if self.reads == ONLY_STATES:
             return {fmi_type for fmi_type, direct in feedthroughs.items() if direct == {False}}
-        wanted = self.reads == DIRECT
-        return {fmi_type for fmi_type, direct in feedthroughs.items() if wanted in direct}
+        is_direct = self.reads == DIRECT
+        return {fmi_type for fmi_type, direct in feedthroughs.items() if is_direct in direct}
 
 
 class Close(NamedTuple):
@@ -348,7 +352,8 @@ def _passing_first(
     passing: list[Stage] = []
     for names, connections in zip(arrangement.stages, gathered, strict=True):
         slow, taken = _taken(
-            [one for one in connections if one.target.component not in ringed], decimation
+            [connection for connection in connections if connection.target.component not in ringed],
+            decimation,
         )
         passed = {
             name: Visit(name, steps=False, reads=DIRECT)
@@ -372,13 +377,13 @@ def _passing_first(
     # An output that is read when values pass is read again after a step if something takes it
     # earlier.
     early = {
-        one.source.component
-        for one in system.connections
-        if place[one.source.component] >= place[one.target.component]
+        connection.source.component
+        for connection in system.connections
+        if place[connection.source.component] >= place[connection.target.component]
     }
     # A component that takes an output with direct feedthrough before it passes must get the output
     # for the inputs of this step.
-    late = {one.source.component for one in arrangement.late}
+    late = {connection.source.component for connection in arrangement.late}
 
     def stepped(name: str) -> Visit:
         if not direct[name]:
@@ -557,10 +562,10 @@ def _reading(visit: Visit, instance: Instance, component: Component) -> list[Cal
     if visit.reads == ALL or not instance.is_here:
         return instance.get_outputs
     outputs = component.having("output")
-    types = [fmi_type for fmi_type in TYPES if any(one.type == fmi_type for one in outputs)]
-    wanted = visit.types_read(component, (one.name for one in outputs))
+    types = [fmi_type for fmi_type in TYPES if any(output.type == fmi_type for output in outputs)]
+    read_types = visit.types_read(component, (output.name for output in outputs))
     calls = zip(instance.get_outputs, types, strict=True)
-    return [call for call, fmi_type in calls if fmi_type in wanted]
+    return [call for call, fmi_type in calls if fmi_type in read_types]
 
 
 def make_stages(

@@ -126,15 +126,15 @@ def _closing(first: str, feeding: Mapping[str, set[str]], fed: Mapping[str, set[
     The search goes both ways at the same time, until one of them ends.
     """
     ways = (feeding, fed)
-    found: tuple[set[str], set[str]] = (set(), set())
+    reached: tuple[set[str], set[str]] = (set(), set())
     ahead = [[first], [first]]
     while all(ahead):
-        for neighbours, known, waiting in zip(ways, found, ahead, strict=True):
+        for neighbours, known, waiting in zip(ways, reached, ahead, strict=True):
             new = neighbours[waiting.pop()] - known
             known |= new
             waiting += new
     done = 0 if not ahead[0] else 1
-    within, neighbours = found[done], ways[1 - done]
+    within, neighbours = reached[done], ways[1 - done]
     closing: set[str] = set()
     waiting = [first]
     while waiting:
@@ -266,7 +266,7 @@ class System:
         values_by_port: dict[PortName, object] = {}
         for key, values_of in sorted(values.items(), key=lambda item: STAR not in str(item[0])):
             stated = key if isinstance(key, PortName) else self._port_name(str(key))
-            names = self.meant(stated)
+            names = self.expand(stated)
             for name, value in zip(names, _spread(stated, values_of, len(names)), strict=True):
                 several = None if self.has(name) else _several(value)
                 ports = [] if several is None else self.members(str(name), ("parameter", "input"))
@@ -297,14 +297,14 @@ class System:
         """
         return isinstance(value, Mapping) and value.keys() in ({"each"}, {"first", "step"})
 
-    def meant(self, name: PortName) -> list[PortName]:
+    def expand(self, name: PortName) -> list[PortName]:
         """Return the ports or groups that match a name with stars, or else the name itself."""
         for like, port in PortName.splits(str(name)) if STAR in str(name) else ():
             starts = tuple(port + mark for mark in _MEMBER)
             names = [
-                PortName(one, port)
-                for one, component in self.components.items()
-                if _is_like(one, like)
+                PortName(owner, port)
+                for owner, component in self.components.items()
+                if _is_like(owner, like)
                 and any(v == port or v.startswith(starts) for v in component.variables)
             ]
             if names:
@@ -342,7 +342,7 @@ class System:
         The longest component that the text begins with wins, if it has such a port; else the port
         that was likely meant. With a star, the first match is returned.
         """
-        name, components, likely = self.meant(name)[0], self.components, None
+        name, components, likely = self.expand(name)[0], self.components, None
         for component, port in PortName.splits(str(name)):
             if component in components:
                 if port in components[component].variables:
@@ -674,8 +674,8 @@ class System:
                     wires.append(f'"{name}.{group}" = "{first}.{group}"')
         if not labels:
             return None
-        wanted = f"; wire {listed(wires)}" if wires else ""
-        return f"nothing feeds or sets {listed(labels)}{wanted}"
+        hint = f"; wire {listed(wires)}" if wires else ""
+        return f"nothing feeds or sets {listed(labels)}{hint}"
 
     def decimations(self, step: float) -> dict[str, int]:
         """Return the number of communication steps in one step of each component.

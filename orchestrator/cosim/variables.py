@@ -102,11 +102,11 @@ def family_of(fmi_type: str) -> str:
     return TYPES[fmi_type].family if fmi_type in TYPES else fmi_type
 
 
-def same(wanted: Value, held: Value) -> bool:
+def same(value: Value, held: Value) -> bool:
     """Return True for a value that equals the one that was set, apart from rounding."""
-    if isinstance(wanted, float) and isinstance(held, float):
-        return isclose(wanted, held, rel_tol=_ROUNDING)
-    return wanted == held
+    if isinstance(value, float) and isinstance(held, float):
+        return isclose(value, held, rel_tol=_ROUNDING)
+    return value == held
 
 
 def are_of(fmi_type: str, numbers: np.ndarray) -> np.ndarray:

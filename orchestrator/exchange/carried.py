@@ -156,14 +156,14 @@ class Carried:
         if tolerance is not None:
             check_tolerance(tolerance)
         results = []
-        found = False
+        has_experiments = False
         for related in self._manifest.iter("Related"):
             role, source = related.get("role", ""), related.get("source", "")
             if role == "result":
                 results.append(source)
             if role.partition("/")[0] != "experiment":
                 continue
-            found = True
+            has_experiments = True
             try:
                 path = self._file(source, [self._place])
                 experiments = self._read(path, "Experiments").findall("Experiment")
@@ -176,7 +176,7 @@ class Carried:
                 name = element.get("name") or f"{source}, experiment {number}"
                 # URIs are relative to different folders in different drafts.
                 yield self._verdict(_Trial(name, element, (path.parent, self._place)), tolerance)
-        if found:
+        if has_experiments:
             return
         for source in results:
             # Without experiments, the results are from the FMU's default experiment.
@@ -373,11 +373,11 @@ def _read_series(path: Path, variables: Sequence[Variable]) -> _Series:
             for place, text in enumerate(names)
             if place not in clocks and (name := port_of(text, known, longest)) is not None
         }
-        found = [variable.name for group in ports.values() for variable in group]
-        if len({*found}) < len(found):
+        port_names = [variable.name for group in ports.values() for variable in group]
+        if len({*port_names}) < len(port_names):
             raise ValueError("two columns belong to the same variable")
         times: list[float] = []
-        columns: dict[str, list[Value]] = {name: [] for name in found}
+        columns: dict[str, list[Value]] = {name: [] for name in port_names}
         for line, row in rows:
             times.append(time_of(row, clocks, f"line {line}"))
             if len(times) > 1 and times[-1] < times[-2]:
@@ -429,16 +429,16 @@ def _compare_results(
     exact = np.where(np.abs(ours[rows] - times) <= slack, ours[rows], times)
     worst, first = 0.0, None
     for name, column in expected.columns.items():
-        wanted, values = column[chosen], table[f"{component.name}.{name}"]
+        references, values = column[chosen], table[f"{component.name}.{name}"]
         if component.variables[name].family == "Real":
             values = np.interp(exact, ours, values)
-            deviations = np.abs(values - wanted) / max(1.0, float(np.abs(wanted).max()))
+            deviations = np.abs(values - references) / max(1.0, float(np.abs(references).max()))
             wrong, worst = deviations > tolerance, max(worst, float(deviations.max()))
         else:
             values = values[rows]
-            wrong = values != wanted
+            wrong = values != references
         if wrong.any() and (first is None or times[wrong][0] < first[0]):
-            first = times[wrong][0], name, values[wrong][0], wanted[wrong][0]
+            first = times[wrong][0], name, values[wrong][0], references[wrong][0]
     if first is not None:
         time, name, value, reference = first
         raise InputError(

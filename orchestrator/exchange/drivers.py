@@ -407,6 +407,6 @@ def write_rows(path: Path, rows: Rows, *seconds: float) -> None:
 
 if __name__ == "__main__":
     run: Callable[[Job], Result] = globals()[sys.argv[1]]
-    found, taken = run(Job(json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))))
+    rows, seconds = run(Job(json.loads(Path(sys.argv[2]).read_text(encoding="utf-8"))))
     # These tools record their rows themselves: reading takes no time.
-    write_rows(Path(sys.argv[3]), found, taken, 0.0)
+    write_rows(Path(sys.argv[3]), rows, seconds, 0.0)

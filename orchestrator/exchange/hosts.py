@@ -164,7 +164,7 @@ def real_outputs(system: System) -> list[tuple[str, str, int]]:
 
 def fmi_of(system: System) -> str:
     """Return the newest version of FMI among the FMUs of a system."""
-    return max(str(one.description.fmiVersion) for one in system.components.values())
+    return max(str(component.description.fmiVersion) for component in system.components.values())
 
 
 def check_parameters(system: System, host: str) -> None:
@@ -225,8 +225,8 @@ def _libcosim(system: System, experiment: Experiment, opener: str, **path: str) 
     def read() -> list[float]:
         return [
             value
-            for name, wanted in references.items()
-            for value in observer.last_real_values(index[name], wanted)
+            for name, numbers in references.items()
+            for value in observer.last_real_values(index[name], numbers)
         ]
 
     return _stepped(step, read, experiment)
@@ -459,14 +459,14 @@ def _job(system: System, experiment: Experiment) -> dict[str, object]:
         ((c.source.component, c.source.port), (c.target.component, c.target.port))
         for c in system.connections
     ]
-    for found, what in (
+    for feature, words in (
         (system.steps, "longer steps of components"),
         (experiment.start_time, "a start time"),
         (any(c.transformation for c in system.connections), "transformations"),
         ({source for source, _ in wires} - {*outputs}, "connections of other types than Real"),
     ):
-        if found:
-            raise InputError(f"can be compared only without {what}")
+        if feature:
+            raise InputError(f"can be compared only without {words}")
     return {
         "fmus": {
             name: str(component.fmu.resolve()) for name, component in system.components.items()

@@ -191,8 +191,8 @@ def verify(
     # The side on which a way agrees for longer is the likelier one.
     n = len(algorithms)
     likelier = (max(pair) for pair in zip(complaints[:n], complaints[n:], strict=True))
-    other = f"not a run of {system.name}, which --scenario names"
-    raise InputError(f"{path}: {other}: {'; '.join(text for _, text in likelier)}")
+    mismatch = f"not a run of {system.name}, which --scenario names"
+    raise InputError(f"{path}: {mismatch}: {'; '.join(text for _, text in likelier)}")
 
 
 def _of_one(system: System, outputs: Collection[str], columns: Sequence[str]) -> str:

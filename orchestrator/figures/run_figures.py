@@ -183,8 +183,8 @@ def _draw_lines(
         if run == 0:
             axes.plot(time, column, color=COLOURS[i], linestyle=STYLES[i], label=label)
         else:
-            other = "other run" if (run, i) == (1, 0) else None
-            axes.plot(time, column, color="black", linewidth=0.7, label=other)
+            legend = "other run" if (run, i) == (1, 0) else None
+            axes.plot(time, column, color="black", linewidth=0.7, label=legend)
 
 
 def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:

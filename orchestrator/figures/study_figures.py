@@ -254,13 +254,13 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
         drawn: dict[Axes, np.ndarray] = {}
         for row, (name, part) in zip(own, below, strict=True):
             row[0].set_ylabel("\n".join(filter(None, (name, runs.label(y)))))
-            for other, cell in part.parts(entry.by[-1:]):
+            for column, cell in part.parts(entry.by[-1:]):
                 places = down.places(cell[y]), across.places(cell[x])
                 groups = grouped(
                     np.ravel_multi_index(places, shape), cell[value], shape[0] * shape[1]
                 )
                 middles = [_of_group(middle, group) for group in groups]
-                drawn[row[beside.index(other)]] = np.reshape(middles, shape)
+                drawn[row[beside.index(column)]] = np.reshape(middles, shape)
         norm = _colour_scale(np.array(list(drawn.values())), value in VERDICTS)
         for axes, cells in drawn.items():
             image = axes.pcolormesh(

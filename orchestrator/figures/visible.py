@@ -138,18 +138,18 @@ class VisibleRows(Table):
             halves = zip(self._divisions[::2], self._divisions[1::2], strict=True)
             self._divisions = [
                 _Division(
-                    self._extremes(np.concatenate((one.pairs, other.pairs))),
-                    one.integral + other.integral,
+                    self._extremes(np.concatenate((first.pairs, second.pairs))),
+                    first.integral + second.integral,
                 )
-                for one, other in halves
+                for first, second in halves
             ]
             self._per_division *= 2
 
     def _extremes(self, pairs: np.ndarray) -> np.ndarray:
         """Return the first and last pair, and those with a watched extreme in their second row."""
         watched = pairs[:, 1, self._watched]
-        kept = {0, len(pairs) - 1, *watched.argmin(axis=0), *watched.argmax(axis=0)}
-        return pairs[sorted(kept)]
+        places = {0, len(pairs) - 1, *watched.argmin(axis=0), *watched.argmax(axis=0)}
+        return pairs[sorted(places)]
 
 
 def draw_signal(axes: Axes, table: Table, signal: Signal, **line: Any) -> bool:

@@ -53,7 +53,7 @@ _LINKED = ("-mexec-model=reactor", "-O2", "-s", "-Wl,--gc-sections")
 _FREE = "__heap_base"
 
 #: Reducers of all indices.
-REDUCERS = tuple(dict.fromkeys(one.reducer for one in metrics()))
+REDUCERS = tuple(dict.fromkeys(index.reducer for index in metrics()))
 
 
 class Source(NamedTuple):

@@ -138,11 +138,11 @@ def preset(name: str) -> tuple[Plain, Sequence[Programs]]:
 
     """
     both, modules = _bundled_runs().get(name) or runs_of(name), [bundled()]
-    found = [modules[0].find(run) for run in both]
-    if None in found:
+    matches = [modules[0].find(run) for run in both]
+    if None in matches:
         modules.append(Programs(both))
-        found = [modules[1].find(run) for run in both]
-    programs = [_Program(len(modules) - 1, *each) for each in found if each is not None]
+        matches = [modules[1].find(run) for run in both]
+    programs = [_Program(len(modules) - 1, *each) for each in matches if each is not None]
     return _preset(name, both, programs), modules
 
 
@@ -226,8 +226,8 @@ def _other(scenario: Scenario, system: System) -> Difference | None:
 
 def _controller(system: System) -> _Controller | None:
     """Return the controller of the first vehicle."""
-    found = system.components.get(loops_of(system)[0].controller)
-    return _CONTROLLERS.get(_type(found)) if found else None
+    component = system.components.get(loops_of(system)[0].controller)
+    return _CONTROLLERS.get(_type(component)) if component else None
 
 
 def _place(system: System) -> int:

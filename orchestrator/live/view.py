@@ -89,10 +89,10 @@ def view_page(
 
 def _vehicles(run: Drawn) -> list[Loop]:
     """Return the vehicles whose paths are known."""
-    found = [loop for loop in run.loops if not run.result.missing(*loop.for_control_point())]
-    for loop in found:
+    loops = [loop for loop in run.loops if not run.result.missing(*loop.for_control_point())]
+    for loop in loops:
         real_parameter(run.result, loop.ell)
-    return found
+    return loops
 
 
 def _drawn(run: Drawn) -> Iterator[str]:
@@ -117,14 +117,14 @@ def _columns(table: Table, loops: Sequence[Loop]) -> list[str]:
     """Return the columns that the page shows: signals of vehicles, or all if there are none."""
     if not loops:
         return [*table.header.numeric_columns]
-    wanted = (
+    names = (
         name
         for loop in loops
         for name in (
             *loop.posture, *loop.y_d, *loop.commanded, *loop.dy, *loop.dy_hat, *loop.theta_hat
         )
     )  # fmt: skip
-    return [name for name in dict.fromkeys(wanted) if name in table]
+    return [name for name in dict.fromkeys(names) if name in table]
 
 
 def _times(tables: Sequence[Table], columns: int) -> np.ndarray:
@@ -174,9 +174,9 @@ def _indices(content: Mapping[str, Any], loop: Loop) -> dict[str, list[float | N
     """Return the indices of a vehicle in metrics.json, and the common ones of all vehicles."""
     of_each = content.get(VEHICLES)
     own = of_each.get(loop.name) if isinstance(of_each, Mapping) else None
-    found = {**content, **own} if isinstance(own, Mapping) else content
+    indices = {**content, **own} if isinstance(own, Mapping) else content
     names = (*(index.name for index in metrics()), SMALLEST_DISTANCE)
-    return {name: _members(found[name]) for name in names if name in found}
+    return {name: _members(indices[name]) for name in names if name in indices}
 
 
 def _members(value: Any) -> list[float | None]:

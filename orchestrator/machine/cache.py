@@ -52,8 +52,8 @@ def read_cached(category: str, key: str) -> dict[Path, bytes]:
         return {path: path.read_bytes() for path in sorted((_READY / category / key).iterdir())}
     with suppress(OSError):
         for folder in sorted((_root(category) / category).glob(f"{key}-*")):
-            if found := _kept_in(folder):
-                return found
+            if files := _kept_in(folder):
+                return files
     return {}
 
 
@@ -88,12 +88,12 @@ def made_once(category: str, key: str, make: Callable[[], Mapping[str, bytes]]) 
         OSError: they cannot be written.
 
     """
-    found = found_or_made(
+    paths = found_or_made(
         category,
         lambda: [*read_cached(category, key)],
         lambda: write_cached(category, key, make()),
     )
-    return {path.name: path for path in found}
+    return {path.name: path for path in paths}
 
 
 def found_or_made(category: str, find: Callable[[], T | None], make: Callable[[], T]) -> T:
@@ -103,8 +103,8 @@ def found_or_made(category: str, find: Callable[[], T | None], make: Callable[[]
         OSError: the folder of the category cannot be written.
 
     """
-    if found := find():
-        return found
+    if result := find():
+        return result
     with hold_lock(category_folder(category), wait=True):
         # Another process may have been first.
         return find() or make()
@@ -139,11 +139,11 @@ def _kept_in(folder: Path) -> dict[Path, bytes]:
         digests = dict(json.loads(_read(folder / _DIGESTS)))
         if any(Path(name).name != name for name in digests):
             return {}
-        found = {folder / name: _read(folder / name) for name in digests}
+        files = {folder / name: _read(folder / name) for name in digests}
     except (OSError, ValueError, TypeError, RecursionError):
         return {}
-    is_whole = [sha256(content).hexdigest() for content in found.values()] == [*digests.values()]
-    return found if is_whole else {}
+    is_whole = [sha256(content).hexdigest() for content in files.values()] == [*digests.values()]
+    return files if is_whole else {}
 
 
 def _read(path: Path) -> bytes:

@@ -146,14 +146,14 @@ def platforms(fmi: str, names: str | None = None) -> list[Platform]:
         return own
     if names == "all":
         return list(known.values())
-    wanted = {name.strip() for name in names.split(",")}
-    for name in sorted(wanted - known.keys()):
+    chosen = {name.strip() for name in names.split(",")}
+    for name in sorted(chosen - known.keys()):
         others = [f"; try --fmi {other}" for other, names in _MACHINES.items() if name in names]
         raise ValueError(
             f"FMI {fmi}.0 has no platform {name!r}; there are {', '.join(known)}, or all"
             f"{''.join(others)}"
         )
-    return [platform for name, platform in known.items() if name in wanted]
+    return [platform for name, platform in known.items() if name in chosen]
 
 
 def this_machine() -> str:
@@ -258,13 +258,13 @@ def compiler_for(wanted: Sequence[Platform]) -> Compiler:
     own, machine = own_compiler(), this_machine()
     targets = _APPLE if machine in _APPLE else {}
     can = {machine, *targets}
-    others = [one.name for one in wanted if not can.issuperset(one.machines)]
+    others = [platform_.name for platform_ in wanted if not can.issuperset(platform_.machines)]
     if own is not None and not others and not machine.endswith("-windows"):
         options = _LINUX if machine.endswith("-linux") else ()
         return Compiler([*own.command, *options], targets)
     if compiler := zig():
         return compiler
-    names = ", ".join(others or [one.name for one in wanted])
+    names = ", ".join(others or [platform_.name for platform_ in wanted])
     remedy = "pip install 'auv-fmu[native]' brings one"
     if not others and machine.endswith("-linux"):
         remedy = f"install gcc or clang, or {remedy}"
@@ -364,9 +364,9 @@ def find_library(category: str, key: str, function: str) -> CDLL | None:
     """Load a library from the cache; None if there is none that has the function."""
     with suppress(OSError):
         for place in read_cached(category, key):
-            found = CDLL(str(place))
-            if hasattr(found, function):
-                return found
+            loaded = CDLL(str(place))
+            if hasattr(loaded, function):
+                return loaded
     return None
 
 

@@ -108,16 +108,16 @@ def plain_file_names(names: Iterable[str], *taken: str) -> list[str]:
 
     No two are equal or differ in case only, since some file systems ignore case.
     """
-    found: list[str] = []
+    file_names: list[str] = []
     used = {name.lower() for name in taken}
     for name in names:
         base = re.sub(r"[^\w.-]", "_", name, flags=re.ASCII)
-        free, number = base, len(found)
+        free, number = base, len(file_names)
         while free.lower() in used:
             free, number = f"{number}_{base}", number + 1
-        found.append(free)
+        file_names.append(free)
         used.add(free.lower())
-    return found
+    return file_names
 
 
 def write_whole(path: Path, text: str, partial: Path) -> None:

@@ -16,9 +16,9 @@ PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
 Identity = Mapping[str, str]
 
 
-def differences(one: Identity, other: Identity) -> list[str]:
+def differences(first: Identity, second: Identity) -> list[str]:
     """Return the sorted names of the entries in which two identities differ."""
-    return sorted(dict(one.items() ^ other.items()))
+    return sorted(dict(first.items() ^ second.items()))
 
 
 def digest_of(*identities: Identity) -> str:
@@ -40,8 +40,8 @@ def code_of(*packages: str) -> str:
     digest = sha256()
     for package in packages:
         root = package_folder(package)
-        found = (path for path in root.rglob("*") if path.suffix in (".c", ".h", ".py"))
-        for path in sorted(found):
+        sources = (path for path in root.rglob("*") if path.suffix in (".c", ".h", ".py"))
+        for path in sorted(sources):
             digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode())
             digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -120,11 +120,11 @@ def _extra(field: FieldInfo, name: str) -> str:
 
 def _type_in_words(annotation: Any, metadata: Sequence[Any] = ()) -> str:
     """Describe a type in words."""
-    for one in metadata:
-        if isinstance(one, str):
-            return one
-        if isinstance(one, OneOf):
-            *others, last = (f"`{name}`" for name in one.names)
+    for item in metadata:
+        if isinstance(item, str):
+            return item
+        if isinstance(item, OneOf):
+            *others, last = (f"`{name}`" for name in item.names)
             return f"{', '.join(others)} or {last}"
     arguments = get_args(annotation)
     match get_origin(annotation):
@@ -137,11 +137,11 @@ def _type_in_words(annotation: Any, metadata: Sequence[Any] = ()) -> str:
         case builtins.list:
             words = f"list of {_type_in_words(arguments[0])}s"
         case builtins.dict:
-            one, *others = _type_in_words(arguments[1]).split(", ")
-            words = ", ".join([f"table of {one}s", *others])
+            noun, *others = _type_in_words(arguments[1]).split(", ")
+            words = ", ".join([f"table of {noun}s", *others])
         case _:
             words = _WORDS.get(annotation, "table")
-    limits = [getattr(one, end) for end in ("ge", "le") for one in metadata if hasattr(one, end)]
+    limits = [getattr(item, end) for end in ("ge", "le") for item in metadata if hasattr(item, end)]
     return f"{words} from {limits[0]} to {limits[1]:,}" if limits else words
 
 
@@ -231,14 +231,14 @@ def _problem(table: type[TomlTable], key: str, value: Any) -> str:
     if key not in declared and table.named is None:
         hint = did_you_mean(key, declared) or f"; use {', '.join(declared)}"
         return f"unknown entry {key!r}{hint}"
-    wanted = declared[key].type if key in declared else "table"
-    if wanted == _WORDS[float] and isinstance(value, int | float) and not isinstance(value, bool):
-        wanted = "finite number"
-    names = re.findall("`(.+?)`", wanted)
-    article = "" if names or wanted.startswith("true") else "a "
+    words = declared[key].type if key in declared else "table"
+    if words == _WORDS[float] and isinstance(value, int | float) and not isinstance(value, bool):
+        words = "finite number"
+    names = re.findall("`(.+?)`", words)
+    article = "" if names or words.startswith("true") else "a "
     hint = did_you_mean(value, names) if isinstance(value, str) else ""
     shown = str(value).lower() if isinstance(value, bool) else shortened(repr(value))
-    return f"{key} = {shown}: write {article}{wanted.replace('`', '')}{hint}"
+    return f"{key} = {shown}: write {article}{words.replace('`', '')}{hint}"
 
 
 def _where(path: Sequence[str | int]) -> str:

@@ -236,17 +236,21 @@ def _extracted(archive: Path, content: ZipFile) -> Path:
     files, size = len(entries), sum(entry.file_size for entry in entries)
     around = next((_sizes[folder] for folder in archive.parents if folder in _sizes), None)
     outermost = archive if around is None else around.outermost
-    beside = [one for one in _sizes.values() if around and one.its_folder == around.its_folder]
+    beside = [
+        unpacked
+        for unpacked in _sizes.values()
+        if around and unpacked.its_folder == around.its_folder
+    ]
     for what, new, others, most in (
-        ("files", files, sum(one.files for one in beside), _MOST_FILES),
-        ("bytes", size, sum(one.bytes for one in beside), _MOST_BYTES),
+        ("files", files, sum(unpacked.files for unpacked in beside), _MOST_FILES),
+        ("bytes", size, sum(unpacked.bytes for unpacked in beside), _MOST_BYTES),
     ):
         if new + others > most:
             raise ValueError(
                 f"it unpacks to {new:,} {what}, and {outermost} with its nested archives to "
                 f"{new + others:,}, more than {most:,}"
             )
-    if (total := size + sum(one.bytes for one in _sizes.values())) > _MOST_OF_A_PROCESS:
+    if (total := size + sum(unpacked.bytes for unpacked in _sizes.values())) > _MOST_OF_A_PROCESS:
         raise ValueError(
             f"it unpacks to {size:,} bytes, and all archives of this process to {total:,}, more "
             f"than {_MOST_OF_A_PROCESS:,}: run them in separate processes"

@@ -78,12 +78,12 @@ class Workers:
             KeyboardInterrupt: there was a signal to stop.
 
         """
-        found: set[Future[Any]] = set()
-        while not found:
-            found, _ = wait(futures, _PATIENCE, FIRST_COMPLETED)
+        finished: set[Future[Any]] = set()
+        while not finished:
+            finished, _ = wait(futures, _PATIENCE, FIRST_COMPLETED)
             if self._interrupts:
                 raise KeyboardInterrupt
-        return found
+        return finished
 
     def results(
         self, tasks: Mapping[_Key, Callable[[], Any]], unit: str

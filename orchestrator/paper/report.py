@@ -120,7 +120,7 @@ def make_runs(
     keys: dict[Request, str] = {}
     labels: dict[str, str] = {}
     runs: dict[str, KeptRun] = {}
-    wanted: dict[str, tuple[int, Request]] = {}
+    to_make: dict[str, tuple[int, Request]] = {}
     for request in dict.fromkeys(requests):
         asked = replace(request, stop_time=stop_time or request.stop_time, kind=kind)
         try:
@@ -130,10 +130,10 @@ def make_runs(
             runs[key] = KeptRun({"failure": str(error)}, Table())
         else:
             key, label = digest_of(prepared.identity), asked.label
-            wanted.setdefault(key, (prepared.experiment.rows, asked))
+            to_make.setdefault(key, (prepared.experiment.rows, asked))
         keys[request] = key
         labels[key] = min(label, labels.get(key, label), key=len)
-    longest_first = sorted(wanted.items(), key=lambda item: -item[1][0])
+    longest_first = sorted(to_make.items(), key=lambda item: -item[1][0])
     tasks = {key: partial(_make, asked) for key, (_, asked) in longest_first}
     runs |= pool.results(tasks, "run")
     named = {key: replace(runs[key], label=label) for key, label in labels.items()}

@@ -325,10 +325,10 @@ class SystemModel:
         system, model = self.plan.system, self.model
         places = {H_MAX: "PARAMETER_AT(h_max)"}
         for name, member in self.text.members.items():
-            of_one = places_of(self.text.definitions[name], f"model.{member}")
+            own_places = places_of(self.text.definitions[name], f"model.{member}")
             if self.text.kind(name).has_h_max:
-                of_one[H_MAX] = f"PARAMETER_AT(model.{self._longest(member)})"
-            places |= {str(PortName(name, port)): place for port, place in of_one.items()}
+                own_places[H_MAX] = f"PARAMETER_AT(model.{self._longest(member)})"
+            places |= {str(PortName(name, port)): place for port, place in own_places.items()}
         types = [type_ for part in self._state for type_ in part.types]
         groups = {
             f"{name}.": [
@@ -609,8 +609,8 @@ def write_fmu(
     """
     path = folder / f"{file_name(model.name)}.fmu"
     try:
-        wanted = platforms_of(fmi, platforms)
-        entries = entries_of(model.parts(fmi), fmi, wanted, compiler_for(wanted), tell)
+        targets = platforms_of(fmi, platforms)
+        entries = entries_of(model.parts(fmi), fmi, targets, compiler_for(targets), tell)
     except InputError:
         raise
     except (OSError, ValueError) as error:

@@ -230,7 +230,11 @@ class Kind:
             scalars(self.types["outputs"], "outputs"),
             strict=True,
         )
-        lines = [f"{to.text} = {of.text};" for port, to, of in places if port.name in self.foreseen]
+        lines = [
+            f"{target.text} = {source.text};"
+            for port, target, source in places
+            if port.name in self.foreseen
+        ]
         return self._function("foresee", "", [*self._computed(), *lines])
 
     def _measured(self, draws: str, group: str) -> str:

@@ -318,7 +318,7 @@ class Equations:
         }
         index_hooks = [hook for reducer in by_id.values() for hook in reducer.hooks.values()]
         program = Program(
-            *chain.from_iterable(of_one.values() for of_one in hooks.values()),
+            *chain.from_iterable(own_hooks.values() for own_hooks in hooks.values()),
             *euler,
             *index_hooks,
         )
@@ -327,14 +327,16 @@ class Equations:
         except Untranslatable as error:
             raise Unsupported(str(error).splitlines()[0]) from None
         trees = {
-            definition: {name: program.function(hook) for name, hook in of_one.items()}
-            for definition, of_one in hooks.items()
+            definition: {name: program.function(hook) for name, hook in own_hooks.items()}
+            for definition, own_hooks in hooks.items()
         }
         self._is_inlined = is_quick
         # A loop that waits for a number to change may never end if it is NaN.
         waits = _waiting(program.functions.values())
         self.is_quick = is_quick and waits.isdisjoint(map(program.function, index_hooks))
-        waiting = {one for one in trees if not waits.isdisjoint(trees[one].values())}
+        waiting = {
+            definition for definition in trees if not waits.isdisjoint(trees[definition].values())
+        }
         checked = waiting.union(*map(feeding, waiting)) if self.is_quick else {*trees}
         self.emitter = Emitter(program.functions.values(), _MOST_COPIED)
         self._euler = {equation.__name__: program.function(equation) for equation in euler}
@@ -542,11 +544,11 @@ class Text:
     @cached_property
     def columns(self) -> dict[PortName, Place]:
         """Places of all inputs and outputs, in the order of a row."""
-        found: dict[PortName, Place] = {}
+        places: dict[PortName, Place] = {}
         for name in self.components:
-            found |= self._inputs(name)
-            found |= self._outputs(name, "_shown" if name in self.slow else ".outputs")
-        return found
+            places |= self._inputs(name)
+            places |= self._outputs(name, "_shown" if name in self.slow else ".outputs")
+        return places
 
     @cached_property
     def inputs(self) -> dict[PortName, int]:
@@ -557,16 +559,16 @@ class Text:
     @cached_property
     def parameters(self) -> dict[PortName, Place]:
         """Places of all parameters and unconnected inputs."""
-        found: dict[PortName, Place] = {}
+        places: dict[PortName, Place] = {}
         for name in self.components:
             kind, owner = self.kind(name), f"it->{self.members[name]}"
-            found |= self._named(name, "parameter", "parameters", f"{owner}.parameters")
+            places |= self._named(name, "parameter", "parameters", f"{owner}.parameters")
             if kind.has_h_max:
-                found[PortName(name, H_MAX)] = Place(f"{owner}.longest_step", FLOAT)
+                places[PortName(name, H_MAX)] = Place(f"{owner}.longest_step", FLOAT)
             fed = {connection.target for connection in self.plan.system.feeding[name]}
             inputs = self._inputs(name).items()
-            found |= {port: place for port, place in inputs if port not in fed}
-        return found
+            places |= {port: place for port, place in inputs if port not in fed}
+        return places
 
     def start(self, name: PortName) -> float | int | bool:
         """Return the value of a parameter or an unconnected input at the start."""
@@ -596,14 +598,14 @@ class Text:
     @cached_property
     def _arrays(self) -> dict[str, str]:
         """Types of all arrays of numbers among inputs and outputs, by place."""
-        found: dict[str, str] = {}
+        types: dict[str, str] = {}
         for name in self.components:
             kind, owner = self.kind(name), f"it->{self.members[name]}"
             shown = f"{owner}_shown" if name in self.slow else f"{owner}.outputs"
             for group, where in (("inputs", f"{owner}.inputs"), ("outputs", shown)):
                 for text, type_ in _arrays(kind.types[group], where):
-                    found[text] = f"{self.emitter.type(type_)} of {type_.n}"
-        return found
+                    types[text] = f"{self.emitter.type(type_)} of {type_.n}"
+        return types
 
     def _foreseen(self, definition: Definition) -> list[str]:
         """Return the outputs that are passed on before the inputs of their component are known."""
@@ -837,7 +839,7 @@ class Text:
 
     def checked_inputs(self, name: str) -> Iterator[str]:
         """Yield statements that refuse inputs that are out of range."""
-        found, kind = self._inputs(name), self.kind(name)
+        inputs, kind = self._inputs(name), self.kind(name)
         feeding = self.plan.system.feeding[name]
         # A product may be infinite, and a whole number too large.
         changed = {
@@ -846,12 +848,12 @@ class Text:
             if self.alters or isinstance(wire.transformation, Linear)
         }
         if self.alters:
-            changed |= {*found}
-            if any(found[wire.target].type != FLOAT for wire in feeding):
+            changed |= {*inputs}
+            if any(inputs[wire.target].type != FLOAT for wire in feeding):
                 number = self.components.index(name)
                 yield f"if (error->raised) return refused(it, {number}, {INPUT}, -1);"
         for i, (port, (target, place)) in enumerate(
-            zip(kind.ports["input"], found.items(), strict=True)
+            zip(kind.ports["input"], inputs.items(), strict=True)
         ):
             tests = []
             if target in changed and place.type == FLOAT:
@@ -885,13 +887,13 @@ class Text:
 
     def _mapped(self, target: PortName, change: Mapped, value: str) -> str:
         place = self.columns[target]
-        of = "int" if is_whole(place.type) else "double"
+        c_type = "int" if is_whole(place.type) else "double"
         tests = "".join(
             f"    if (value == {number_in_c(float(a))}) return {number_in_c(_as(place, b))};\n"
             for a, b in change.pairs
         )
-        body = f"(double value) {{\n{tests}    return ({of})value;\n}}"
-        head = self._mappings.setdefault(body, f"static {of} mapped_{len(self._mappings)}")
+        body = f"(double value) {{\n{tests}    return ({c_type})value;\n}}"
+        head = self._mappings.setdefault(body, f"static {c_type} mapped_{len(self._mappings)}")
         return f"{head.rpartition(' ')[2]}({value})"
 
     # Rows
@@ -914,8 +916,8 @@ class Text:
         lines, gives, n = ["const double h = t - it->looked;"], [], 0
         for i, (reducer, sources) in enumerate(self.indices):
             text = self.reducers[id(reducer)]
-            of = dict(zip((port.name for port in reducer.ports), sources, strict=True))
-            row = text.row(lambda port, of=of: self._source(of[port.name]))  # type: ignore[misc]
+            source_of = dict(zip((port.name for port in reducer.ports), sources, strict=True))
+            row = text.row(lambda port, source_of=source_of: self._source(source_of[port.name]))  # type: ignore[misc]
             look = (
                 f"{text.name}_look(&it->index_{i}, {row}, {acts_at_end}, t, h, it->start_time, "
                 "it->stop_time, &(Error){0});"
@@ -1296,9 +1298,9 @@ def _copies(values: Sequence[tuple[str, str]], arrays: Mapping[str, str] = {}) -
         run.append(assignment)
 
 
-def _follows(one: tuple[str, str], other: tuple[str, str]) -> bool:
+def _follows(first: tuple[str, str], second: tuple[str, str]) -> bool:
     """Tell whether two assignments are of neighbours in arrays."""
-    for before, after in zip(one, other, strict=True):
+    for before, after in zip(first, second, strict=True):
         a, b = _ELEMENT.fullmatch(before), _ELEMENT.fullmatch(after)
         if a is None or b is None or a.groups()[:2] != b.groups()[:2]:
             return False

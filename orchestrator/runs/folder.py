@@ -426,23 +426,23 @@ def _keep_files(ledger: Ledger) -> str:
     try:
         # It may state that the run was completed.
         (ledger.staging / RECORD).unlink(missing_ok=True)
-        kept = ledger.staging.rename(_free_place(ledger.folder))
+        place = ledger.staging.rename(_free_place(ledger.folder))
     except OSError as error:
         return f"; nor can the files be kept: {reason(error)}"
-    return f"; what was written is in {kept}"
+    return f"; what was written is in {place}"
 
 
 def publish(ledger: Ledger) -> Path:
     """Move the files of the staging folder to their places, and return the folder."""
     record, earlier = _record(ledger.staging), _record(ledger.folder)
     place = place_of(ledger)
-    kept = [name for name in ledger.files if re.match(rf"{INCOMPLETE}(-\d+)?/", name)]
+    incomplete = [name for name in ledger.files if re.match(rf"{INCOMPLETE}(-\d+)?/", name)]
     if place != ledger.folder:
-        ledger.set_aside(place, kept)
+        ledger.set_aside(place, incomplete)
     elif record:
         names = earlier.get("files")
         replaced = [*map(str, names if isinstance(names, list) else ()), VIEW]
-        ledger.publish(replaced if record.get("failure") else replaced + kept)
+        ledger.publish(replaced if record.get("failure") else replaced + incomplete)
     else:
         # Only a run replaces the result of a run: an export does not.
         ledger.publish()

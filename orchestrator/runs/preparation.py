@@ -428,5 +428,5 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
     values = {**shared(scenario.parameters), **system.expanded(difference.parameters)}
     companion = replace(companion, parameters=values, events=shared_events(scenario.events, system))
     given = shared(prepared.system.expanded(request.parameters))
-    wanted = replace(request, parameters=given, events=None, inputs=None)
-    return [prepared, prepare(companion, system.with_parameters(values), wanted)]
+    own_request = replace(request, parameters=given, events=None, inputs=None)
+    return [prepared, prepare(companion, system.with_parameters(values), own_request)]

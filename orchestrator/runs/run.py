@@ -117,10 +117,10 @@ def simulate(options: SimulateOptions) -> Result:
     warn_of(findings, [] if options.system is system else prepared.doubts(), _STACK_LEVEL)
     result = Result(scenario, prepared.loops, prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * options.progress)]
-    with _checkpoints_for(prepared, options) as kept:
-        result.resumed_at = next((checkpoints.time for checkpoints in kept), None)
-        ending = prepared.run([*observers, *kept], kept)
-        leave_checkpoints(kept, ending.failure is None)
+    with _checkpoints_for(prepared, options) as all_checkpoints:
+        result.resumed_at = next((checkpoints.time for checkpoints in all_checkpoints), None)
+        ending = prepared.run([*observers, *all_checkpoints], all_checkpoints)
+        leave_checkpoints(all_checkpoints, ending.failure is None)
     for number in ending.interrupts:
         # Held back while the FMUs computed; now it acts as usual.
         signal.raise_signal(number)
@@ -284,7 +284,7 @@ def run_into(
         held_interrupts() as interrupts,
         replace_files(folder, names, force=files.force, keep=lambda: bool(done)) as staging,
     ):
-        kept = checkpoints_of(
+        all_checkpoints = checkpoints_of(
             runs,
             [inner_folder(folder, CHECKPOINTS, *filter(None, [name])) for name in below],
             files.checkpoint_every,
@@ -313,7 +313,9 @@ def run_into(
 
         latest = staging
         try:
-            for prepared, name, columns, checkpoints in zip_longest(runs, below, tables, kept):
+            for prepared, name, columns, checkpoints in zip_longest(
+                runs, below, tables, all_checkpoints
+            ):
                 for caution in cautions(
                     values_of(prepared.system), prepared.experiment.step, prepared.loops
                 ):
@@ -347,7 +349,9 @@ def run_into(
         _write_ends(done, command, clock)
         place = place_of(Ledger(folder))
     # The second run is missing after an interrupt.
-    leave_checkpoints(kept, [run.ending.failure for run in done] == [None] * len(runs), say)
+    leave_checkpoints(
+        all_checkpoints, [run.ending.failure for run in done] == [None] * len(runs), say
+    )
     return place, done
 
 
@@ -411,12 +415,12 @@ def _certificates(vehicle: str) -> str:
     return f"certificates{vehicle}.csv"
 
 
-def selected_columns(system: System, wanted: str, is_companion: bool = False) -> list[str] | None:
+def selected_columns(system: System, choice: str, is_companion: bool = False) -> list[str] | None:
     """Choose the columns of a table by `all`, `outputs`, or patterns with commas between them.
 
     Args:
         system: the system of the run.
-        wanted: the choice.
+        choice: `all`, `outputs`, or the patterns.
         is_companion: True if patterns may match nothing, because another run has the columns.
 
     Returns:
@@ -426,9 +430,9 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
         InputError: a pattern matches no column.
 
     """
-    if wanted == "all":
+    if choice == "all":
         return None
-    outputs = wanted == "outputs"
+    outputs = choice == "outputs"
     names = [
         f"{component.name}.{variable.name}"
         for component in system.components.values()
@@ -437,7 +441,7 @@ def selected_columns(system: System, wanted: str, is_companion: bool = False) ->
     ]
     if outputs:
         return names
-    patterns = [pattern.strip() for pattern in wanted.split(",") if pattern.strip()]
+    patterns = [pattern.strip() for pattern in choice.split(",") if pattern.strip()]
     if not patterns:
         raise InputError("--columns: name columns, or write all or outputs")
     for name, component in system.components.items():
@@ -490,18 +494,18 @@ def checkpoints_of(
         return []
     for prepared in runs:
         check_gives_states(prepared.system)
-    kept = []
+    all_checkpoints = []
     for folder, prepared in zip(folders, runs, strict=True):
         checkpoints = Checkpoints(folder, prepared.identity, every, resume, force, token)
         # FMUs may change the current folder.
         checkpoints.folder = checkpoints.folder.absolute()
-        kept.append(checkpoints)
-    for checkpoints, prepared in zip(kept, runs, strict=True):
+        all_checkpoints.append(checkpoints)
+    for checkpoints, prepared in zip(all_checkpoints, runs, strict=True):
         if checkpoints.time is not None:
             say(f"{prepared.scenario.name}: continues at t = {checkpoints.time:g} s")
-    if resume and not any(checkpoints.time for checkpoints in kept):
+    if resume and not any(checkpoints.time for checkpoints in all_checkpoints):
         say(f"nothing to resume in {folders[0]}: starts from the beginning")
-    return kept
+    return all_checkpoints
 
 
 def check_gives_states(system: System) -> None:
@@ -515,11 +519,13 @@ def check_gives_states(system: System) -> None:
 
 
 def leave_checkpoints(
-    kept: Sequence[Checkpoints], is_whole: bool, say: Callable[[str], None] = lambda _: None
+    all_checkpoints: Sequence[Checkpoints],
+    is_whole: bool,
+    say: Callable[[str], None] = lambda _: None,
 ) -> None:
     """Remove the checkpoints of runs that belong together if all are complete, else name them."""
     # The first folder contains the others.
-    for checkpoints in reversed(kept):
+    for checkpoints in reversed(all_checkpoints):
         if is_whole:
             checkpoints.remove()
         elif checkpoints.time is not None:

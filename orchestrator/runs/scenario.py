@@ -134,7 +134,9 @@ class Inputs:
 
     def _columns(self, variables: Sequence[Variable]) -> list[np.ndarray]:
         named = dict(zip(self.names, variables, strict=True))
-        types = {name: one.type for name, one in named.items() if one.type in Header.TYPES}
+        types = {
+            name: variable.type for name, variable in named.items() if variable.type in Header.TYPES
+        }
         header = Header(self.names, Experiment(1.0, 1.0), types=types)
         encoders = header.encoders
         numbers = {
@@ -551,7 +553,7 @@ def _ports(
         InputError: there is none with one of the causalities, or, if `single`, there are several.
 
     """
-    several = system.meant(PortName.read(text))
+    several = system.expand(PortName.read(text))
     if len(several) > 1:
         if single:
             raise InputError(f"{text} are {len(several)} signals; name one of them")

@@ -134,9 +134,9 @@ def sweep(
         KeyboardInterrupt: Ctrl-C; finished runs are kept.
 
     """
-    wanted = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
+    parsed = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
     means = Means(engine, kind, loop, scheduler, workers, force)
-    return complete_study(wanted, means, study_folder(wanted, out), sys.argv, progress=progress)
+    return complete_study(parsed, means, study_folder(parsed, out), sys.argv, progress=progress)
 
 
 def study_folder(study: Study, out: str | Path | None) -> Path:

@@ -80,12 +80,12 @@ def gain_of_a_step(value: ValueOf, h: float, controller: str = STANDARD.controll
 
 def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution]:
     """Return the warnings before a run with steps of a length [s]."""
-    found = []
+    unstable = []
     for controller in dict.fromkeys(loop.controller for loop in loops):
         values = [value(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
         if None in values:
             continue
-        k_d, lambda_, h_max = (float(one or 0.0) for one in values)
+        k_d, lambda_, h_max = (float(number or 0.0) for number in values)
         h = min(step, h_max)
         h_p = h * observer_rate(lambda_, gain_of_a_step(value, h, controller))
         if h_p > _GROWS:
@@ -94,8 +94,8 @@ def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution
                 f"observer's fastest mode has h p = {h_p:.3g} and grows above {_GROWS:g}; lower "
                 "k_d or h_max"
             )
-            found.append(Caution(UNSTABLE, text))
-    return found
+            unstable.append(Caution(UNSTABLE, text))
+    return unstable
 
 
 def differing_vehicle(system: System) -> str | None:
@@ -105,8 +105,8 @@ def differing_vehicle(system: System) -> str | None:
         One line; None if there are none.
 
     """
-    found = (_differing(system, loop) for loop in loops_of(system))
-    return "; ".join(filter(None, found)) or None
+    texts = (_differing(system, loop) for loop in loops_of(system))
+    return "; ".join(filter(None, texts)) or None
 
 
 def _differing(system: System, loop: Loop) -> str | None:
@@ -173,8 +173,8 @@ class Watch:
             for caution in cautions_seen(
                 {
                     name: value
-                    for one in reductions.values()
-                    for name, [value] in one.found().items()
+                    for reduction in reductions.values()
+                    for name, [value] in reduction.found().items()
                 },
                 loop,
                 partial(value_of, table),
@@ -191,7 +191,7 @@ def cautions_seen(
     roll, eps = f"{loop.vehicle}.roll", f"{loop.controller}.eps_t"
     needed = (eps, loop.ell, f"{loop.controller}.h_max", *loop.vehicle_parameters)
     known = map(value, needed) if rho_hat > 0.0 else ()
-    numbers = [float(one) for one in known if isinstance(one, int | float)]
+    numbers = [float(number) for number in known if isinstance(number, int | float)]
     if len(numbers) == len(needed) and min(numbers[:2]) > 0.0:
         eps_t, ell, h_max, *plant = numbers
         lambda_m2 = bounds(Vehicle._make(plant), ell).lambda_m2

@@ -196,8 +196,10 @@ def for_distances(loops: Sequence[Loop]) -> Needs:
 def distances(table: Table, loops: Sequence[Loop]) -> dict[tuple[str, str], np.ndarray]:
     """Return the distance of the centres of mass of each two vehicles, by name, per row [m]."""
     return {
-        (one.name, other.name): size(table.group(*one.position) - table.group(*other.position))
-        for one, other in combinations(loops, 2)
+        (first.name, second.name): size(
+            table.group(*first.position) - table.group(*second.position)
+        )
+        for first, second in combinations(loops, 2)
     }
 
 
@@ -266,7 +268,9 @@ class Indices:
 
     def found(self, loop: Loop = STANDARD) -> dict[str, list[float]]:
         """Return the members of the indices of a loop, by the names of the indices."""
-        results = {reducer: one.found() for reducer, one in self._reductions[loop].items()}
+        results = {
+            reducer: reduction.found() for reducer, reduction in self._reductions[loop].items()
+        }
         return {
             index.name: results[index.reducer][index.name]
             for index in self._chosen
@@ -276,18 +280,22 @@ class Indices:
     @property
     def failures(self) -> list[str]:
         """Messages of the indices that have raised an exception."""
-        every = (one for reductions in self._reductions.values() for one in reductions.values())
-        return [one.failure for one in every if one.failure]
+        every = (
+            reduction
+            for reductions in self._reductions.values()
+            for reduction in reductions.values()
+        )
+        return [reduction.failure for reduction in every if reduction.failure]
 
     def values(self) -> dict[str, float]:
         """Return the numbers of all loops, by their columns in a study."""
         return self.together | {
             f"{prefix}{column}": value
             for loop, prefix in prefixed(self._loops)
-            for found in [self.found(loop)]
+            for numbers in [self.found(loop)]
             for index in self._chosen
-            if index.name in found
-            for column, value in zip(index.columns, found[index.name], strict=True)
+            if index.name in numbers
+            for column, value in zip(index.columns, numbers[index.name], strict=True)
         }
 
 
@@ -316,11 +324,11 @@ class Metrics(Indices):
         return content | self.together | {VEHICLES: vehicles}
 
     def _vehicle(self, loop: Loop, system: System) -> dict[str, Any]:
-        found = self.found(loop)
+        numbers = self.found(loop)
         content: dict[str, Any] = {
-            index.name: found[index.name] if len(index.units) > 1 else found[index.name][0]
+            index.name: numbers[index.name] if len(index.units) > 1 else numbers[index.name][0]
             for index in self._chosen
-            if index.name in found
+            if index.name in numbers
         }
         if loop.controller in system.components:
             reaching = velocities_reaching(system, loop)
@@ -335,11 +343,11 @@ def of_vehicles(content: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 def metrics_of(table: Table, loops: Sequence[Loop] = (STANDARD,)) -> Metrics:
     """Return the metrics of a finished run."""
-    found = Metrics(loops)
-    found.begin(table.header)
-    found.take(table.rows)
-    found.end(table.ending)
-    return found
+    result = Metrics(loops)
+    result.begin(table.header)
+    result.take(table.rows)
+    result.end(table.ending)
+    return result
 
 
 def _differing(system: System, held: Mapping[PortName, Any]) -> Iterator[tuple[str, Any]]:
@@ -347,6 +355,6 @@ def _differing(system: System, held: Mapping[PortName, Any]) -> Iterator[tuple[s
     for name, value in {**held, **system.parameters}.items():
         component = system.component(name.component)
         variable = component.variable(name.port)
-        shown, own = (variable.shown(one) for one in (value, component.start(name.port)))
+        shown, own = (variable.shown(raw) for raw in (value, component.start(name.port)))
         if shown != own:
             yield str(name), shown

@@ -85,10 +85,10 @@ def _saturation(value: object, name: str) -> Saturation:
         InputError: there is none.
 
     """
-    for one in Saturation:
-        if value in (one.value, one.name.lower()):
-            return one
-    known = ", ".join(one.name.lower() for one in Saturation)
+    for saturation in Saturation:
+        if value in (saturation.value, saturation.name.lower()):
+            return saturation
+    known = ", ".join(saturation.name.lower() for saturation in Saturation)
     raise InputError(f"{name} = {value}: use one of {known}")
 
 

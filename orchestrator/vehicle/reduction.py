@@ -78,20 +78,20 @@ def sources_of(
         InputError: a parameter is not a number.
 
     """
-    found = Sources({}, {}, [])
+    sources = Sources({}, {}, [])
     for port in reducer.ports:
         name = loop.port(port.name)
         if port.name in loop.implied:
-            found.constants[port.name] = loop.implied[port.name]
+            sources.constants[port.name] = loop.implied[port.name]
         elif name in places:
-            found.places[port.name] = places[name]
+            sources.places[port.name] = places[name]
         elif name in values:
-            found.constants[port.name] = _number(port, name, values[name])
+            sources.constants[port.name] = _number(port, name, values[name])
         elif port.name in reducer.defaults:
-            found.constants[port.name] = reducer.defaults[port.name]
+            sources.constants[port.name] = reducer.defaults[port.name]
         else:
-            found.missing.append(name)
-    return found
+            sources.missing.append(name)
+    return sources
 
 
 def _number(port: Port, name: str, value: Any) -> Value:
@@ -118,12 +118,12 @@ def reductions_of(
 
     """
     values = {str(name): value for name, value in header.parameters.items()}
-    found: dict[Loop, dict[Reducer, Reduction]] = {loop: {} for loop in loops}
+    reductions: dict[Loop, dict[Reducer, Reduction]] = {loop: {} for loop in loops}
     for loop, reducer in product(loops, reducers):
         sources = sources_of(reducer, loop, header.place, values)
         if not sources.missing:
-            found[loop][reducer] = Reduction(reducer, sources, header.experiment)
-    return found
+            reductions[loop][reducer] = Reduction(reducer, sources, header.experiment)
+    return reductions
 
 
 # Evaluation, in Python or compiled
@@ -146,10 +146,10 @@ class _Interpreted:
         self._arguments = {name: reducer.arguments(name) for name in reducer.hooks}
         names = {port.name: f"x{i}" for i, port in enumerate(reducer.ports)}
         types = {port.name: port.type for port in reducer.ports}
-        made = {one: _MADE.get(types[one], _WHOLE).format(names[one]) for one in sources.places}
-        scope = {**SCOPE, **{names[one]: value for one, value in sources.constants.items()}}
+        made = {name: _MADE.get(types[name], _WHOLE).format(names[name]) for name in sources.places}
+        scope = {**SCOPE, **{names[name]: value for name, value in sources.constants.items()}}
         inputs = gathered(reducer.inputs, iter({**names, **made}.values()), scope)
-        row = ", ".join(["time", *(names[one] for one in sources.places)])
+        row = ", ".join(["time", *(names[name] for name in sources.places)])
         self._inputs = compiled("row", f"({row},) = row\n return {inputs}", scope)
         self._state: Any = None
         self._before: Any = None
@@ -165,7 +165,7 @@ class _Interpreted:
         given |= {"state": self._state, "t": t}
         given |= {"begin": self._run.start_time, "end": self._run.stop_time}
         try:
-            return self._reducer.hooks[hook](*(given[one] for one in self._arguments[hook]))
+            return self._reducer.hooks[hook](*(given[name] for name in self._arguments[hook]))
         except Exception as error:
             raise Raised(f"{type(error).__name__}: {error}", t) from error
 
@@ -238,13 +238,13 @@ class _Compiled:
             Raised: a hook has raised an exception.
 
         """
-        found = np.empty(sum(1 for _ in chain(*self._reducer.results.values())))
+        array = np.empty(sum(1 for _ in chain(*self._reducer.results.values())))
         run = self._run
         if self._library.give_numbers(
-            self._memory, run.start_time, run.stop_time, found.ctypes.data
+            self._memory, run.start_time, run.stop_time, array.ctypes.data
         ):
             raise Raised(self._library.why(self._memory).decode(), run.stop_time)
-        numbers: list[float] = found.tolist()
+        numbers: list[float] = array.tolist()
         return numbers
 
 
@@ -352,4 +352,4 @@ class Reduction:
             return {}
         results = self._reducer.results.items()
         values = {name: [next(numbers) for _ in ports] for name, ports in results}
-        return {name: found for name, found in values.items() if not all(map(isnan, found))}
+        return {name: members for name, members in values.items() if not all(map(isnan, members))}

@@ -159,7 +159,7 @@ class AllocatedLoop(Loop):
 STANDARD = Loop()
 
 #: Roles of components by their names in the standard loop.
-_ROLES = {getattr(STANDARD, one.name): one.name for one in fields(STANDARD)}
+_ROLES = {getattr(STANDARD, field.name): field.name for field in fields(STANDARD)}
 
 
 def loop_of(names: Mapping[str, str]) -> Loop:
@@ -192,10 +192,10 @@ def suffixes(loops: Sequence[Loop]) -> dict[Loop, str]:
     """Return suffixes for names of files about one loop: with several, the vehicle's name."""
     if len(loops) == 1:
         return {loops[0]: ""}
-    found: dict[Loop, str] = {}
+    endings: dict[Loop, str] = {}
     for loop in loops:
-        found[loop] = f"-{file_name(loop.name, [name[1:] for name in found.values()])}"
-    return found
+        endings[loop] = f"-{file_name(loop.name, [name[1:] for name in endings.values()])}"
+    return endings
 
 
 def _has(system: System, component: str, causality: str, port: str) -> bool:
@@ -209,10 +209,12 @@ def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
         if component in system.components:
             wires = list(system.reaching(component, set(vehicles)))
             group = f"{component}.{group}."
-            found = [wire for wire in wires if _has(system, wire.source.component, causality, port)]
-            found += [wire for wire in wires if str(wire.target).startswith(group)]
-            if found:
-                return found[0].source.component
+            feeders = [
+                wire for wire in wires if _has(system, wire.source.component, causality, port)
+            ]
+            feeders += [wire for wire in wires if str(wire.target).startswith(group)]
+            if feeders:
+                return feeders[0].source.component
         return role if len(vehicles) == 1 else f"{vehicle}.{role}"
 
     controller = feeding(vehicle, "tau", "controller", "input", "y_d.x")
@@ -227,7 +229,7 @@ def _loop(system: System, vehicle: str, vehicles: Sequence[str]) -> Loop:
 def value_of(table: Table, name: str) -> Value | None:
     """Return the value of a parameter `component.name` in a run; None if there is none."""
     names = (PortName(component, port) for component, port in PortName.splits(name))
-    return next((table.parameters[one] for one in names if one in table.parameters), None)
+    return next((table.parameters[key] for key in names if key in table.parameters), None)
 
 
 def real_parameter(table: Table, name: str) -> float:

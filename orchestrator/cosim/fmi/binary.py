@@ -103,9 +103,9 @@ def make_binary(component: Component, folder: Path) -> None:
     key = _key(component)
     try:
         with hold_lock(cache.category_folder(_CATEGORY), wait=True):
-            kept = cache.read_cached(_CATEGORY, key)
-            content = next(iter(kept.values())) if kept else _compiled(component, sources)
-            if not kept:
+            cached = cache.read_cached(_CATEGORY, key)
+            content = next(iter(cached.values())) if cached else _compiled(component, sources)
+            if not cached:
                 with suppress(OSError):
                     cache.write_cached(_CATEGORY, key, {binary.name: content})
         binary.parent.mkdir(parents=True, exist_ok=True)
@@ -212,21 +212,23 @@ def _sources_of(component: Component, folder: Path) -> Sources | None:
     except Exception as error:
         raise InputError(f"{component.fmu}: buildDescription.xml: {reason(error)}") from error
     sets = [
-        one
+        file_set
         for build in (*described, *component.description.buildConfigurations)
         if build.modelIdentifier == identifier
-        for one in build.sourceFileSets
+        for file_set in build.sourceFileSets
     ]
     if not sets:
         files = sorted(place.glob("*.c"))
         return Sources(files, [f"-I{place}", *beside]) if files else None
-    files = list(dict.fromkeys(place / name for one in sets for name in one.sourceFiles))
+    files = list(dict.fromkeys(place / name for file_set in sets for name in file_set.sourceFiles))
     for file in files:
         if not (file.is_file() and file.resolve().is_relative_to(place.resolve())):
             raise InputError(f"{component.fmu}: holds no sources/{file.relative_to(place)}")
-    options = [f"-I{place / name}" for one in sets for name in ("", *one.includeDirectories)]
-    for one in sets:
-        for definition in one.preprocessorDefinitions:
+    options = [
+        f"-I{place / name}" for file_set in sets for name in ("", *file_set.includeDirectories)
+    ]
+    for file_set in sets:
+        for definition in file_set.preprocessorDefinitions:
             if not definition.optional:
                 value = "" if definition.value is None else f"={definition.value}"
                 options.append(f"-D{definition.name}{value}")

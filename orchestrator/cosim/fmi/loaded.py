@@ -522,7 +522,7 @@ class LoadedInstance:
         self._gives_state = component.gives_state
         self.gives_derivatives = component.gives_derivatives
         categories = component.description.logCategories
-        self._logged = [one.name for one in categories if one.name in _LOGGED]
+        self._logged = [category.name for category in categories if category.name in _LOGGED]
         self._kept = fmi2FMUstate()
         self._library = library
         self._listener = listener

@@ -756,7 +756,7 @@ def _texts(value: Element, is_array: bool) -> list[str]:
     if is_array and family_of(value.tag) in ("Real", "Integer", "Boolean"):
         return value.get("value", "").split()
     several = value.findall("Value")
-    return [text for one in several or [value] if (text := one.get("value")) is not None]
+    return [text for element in several or [value] if (text := element.get("value")) is not None]
 
 
 def _inside_out(

@@ -243,10 +243,10 @@ def _in(top: Nest, way: SystemPath, start: End, crossing: Crossing, shared: int)
     return start
 
 
-def _shared(one: SystemPath, other: SystemPath) -> int:
+def _shared(first: SystemPath, second: SystemPath) -> int:
     """Return the number of systems that two ways share."""
-    same = (a == b for a, b in zip(one, other, strict=False))
-    return next((n for n, is_same in enumerate(same) if not is_same), min(len(one), len(other)))
+    same = (a == b for a, b in zip(first, second, strict=False))
+    return next((n for n, is_same in enumerate(same) if not is_same), min(len(first), len(second)))
 
 
 def _nests(top: Nest, way: SystemPath) -> list[Nest]:
@@ -356,7 +356,7 @@ def ssp_bytes(
             content.writestr(ZipInfo(source, _EPOCH), values)
         fmus = {sources[name]: component for name, component in system.components.items()}
         # Sorted by path, so that the archive's bytes do not depend on names.
-        for source, component in sorted(fmus.items(), key=lambda one: one[1].fmu):
+        for source, component in sorted(fmus.items(), key=lambda item: item[1].fmu):
             fmu = read_archive(component.fmu, component.digest)
             content.writestr(ZipInfo(source, _EPOCH), fmu)
     return archive.getvalue()
