@@ -186,15 +186,15 @@ def _groups(port: Port) -> str:
 
 def _row(members: Sequence[Sequence[Port]], types: Mapping[str, str]) -> list[str]:
     port = members[0][0]
-    cells = [_names([one[0] for one in members])]
+    cells = [_names([member[0] for member in members])]
     if len(members[0]) > 1:
-        cells[0] += f" to {_names([one[-1] for one in members])}"
-    units = dict.fromkeys(one[0].unit or types.get(port.type, port.type) for one in members)
+        cells[0] += f" to {_names([member[-1] for member in members])}"
+    units = dict.fromkeys(member[0].unit or types.get(port.type, port.type) for member in members)
     cells.append(", ".join(units))
     description = _described(port)
     if port.causality != "parameter":
         return [*cells, description, _groups(port)]
-    starts = [_starts(one) for one in members]
+    starts = [_starts(member) for member in members]
     if len({*starts}) == 1:
         starts = starts[:1]
     tunable = "; tunable" if port.variability == "tunable" else ""
@@ -210,7 +210,7 @@ def _names(ports: Sequence[Port]) -> str:
 
 
 def _starts(ports: Sequence[Port]) -> str:
-    starts = [_start(one) for one in ports]
+    starts = [_start(port) for port in ports]
     while len(starts) > 1 and starts[-1] == starts[-2]:
         starts.pop()
     return ", ".join(starts)

@@ -259,7 +259,7 @@ def _section(study: Study) -> str:
         settings["stop_time"] = study.stop_time.base
     stated = [study.scenario[0], *(f"{key}={value}" for key, value in settings.items())]
     # The live page does not accept stars in names.
-    live = "" if any("*" in one for one in stated) else f" <!-- live: {'&'.join(stated)} -->"
+    live = "" if any("*" in part for part in stated) else f" <!-- live: {'&'.join(stated)} -->"
     pictures = (
         f"![{seen(study, name)}](../{PICTURES}/studies/{study.name}-{name}.png)"
         for name in study.figures
@@ -344,7 +344,7 @@ def command_line() -> dict[str, str]:
     """Parts of docs/reference/command-line.md: common arguments, and a section for each command."""
     top = commands(parser(COMMANDS))
     leaves = [leaf for command in top.values() for leaf in commands(command).values() or [command]]
-    rows = Counter(_row(one) for leaf in leaves for one in _arguments(leaf))
+    rows = Counter(_row(argument) for leaf in leaves for argument in _arguments(leaf))
     common = {row for row, uses in rows.items() if uses > 1}
     sections = (
         section
@@ -397,8 +397,8 @@ def _sections(
         if isinstance(action, argparse._SubParsersAction)
         for choice in action._choices_actions
     }
-    for one, subcommand in below.items():
-        yield from _sections(f"{name} {one}", texts[one], subcommand, common, level + 1)
+    for word, subcommand in below.items():
+        yield from _sections(f"{name} {word}", texts[word], subcommand, common, level + 1)
 
 
 def _usage(name: str, actions: Sequence[argparse.Action]) -> str:
@@ -474,7 +474,7 @@ def gallery() -> str:
     """The scenarios in docs/gallery.md, two in a row."""
     cells = [*map(_scenario, sorted(map(read_scenario, names()), key=_place))]
     pairs = zip_longest(cells[::2], cells[1::2], fillvalue="")
-    return "\n".join(["| | |", "|---|---|", *(f"| {one} | {other} |" for one, other in pairs)])
+    return "\n".join(["| | |", "|---|---|", *(f"| {left} | {right} |" for left, right in pairs)])
 
 
 def seen(study: Study, figure: str) -> str:
@@ -484,7 +484,7 @@ def seen(study: Study, figure: str) -> str:
 
     def words(columns: str | list[str] | None) -> str:
         named = [columns] if isinstance(columns, str) else columns or []
-        called = (labels.get(one) or Values({}).label(one) for one in named)
+        called = (labels.get(column) or Values({}).label(column) for column in named)
         return ", ".join(re.sub(r" \[.*\]$|[|]|\$.*\$, ", "", text) for text in called)
 
     x, y, show = declared.x, declared.y, declared.show

@@ -135,7 +135,7 @@ def _run(*command: object) -> str:
             start_new_session=True,
         )
         try:
-            said = process.communicate(timeout=PATIENCE)[1].decode(errors="replace").strip()
+            complaint = process.communicate(timeout=PATIENCE)[1].decode(errors="replace").strip()
         except subprocess.TimeoutExpired:
             # An FMU may have started programs of its own.
             os.killpg(process.pid, signal.SIGKILL)
@@ -143,7 +143,11 @@ def _run(*command: object) -> str:
             return f"no end after {PATIENCE} s"
     if process.returncode < 0:
         return signal.Signals(-process.returncode).name
-    return said.splitlines()[-1][:_LONGEST_REASON] if said else f"status {process.returncode}"
+    return (
+        complaint.splitlines()[-1][:_LONGEST_REASON]
+        if complaint
+        else f"status {process.returncode}"
+    )
 
 
 def _same(held: Any, wanted: Any) -> bool:

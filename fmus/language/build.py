@@ -660,7 +660,7 @@ class _Builder:
         if isinstance(pattern, ast.MatchAs) and pattern.pattern is None and pattern.name is None:
             return []
         if isinstance(pattern, ast.MatchOr):
-            found = [self._cases(one) for one in pattern.patterns]
+            found = [self._cases(alternative) for alternative in pattern.patterns]
             return [value for values in found for value in values] if all(found) else []
         if isinstance(pattern, ast.MatchValue):
             value = self.expression(pattern.value)
@@ -763,7 +763,7 @@ class _Builder:
         types = {name: inner.made.arguments[name] for name in names}
         n = len(names) - len(given.kwonlyargs)
         defaults = [*zip(names[n - len(given.defaults) : n], given.defaults)]
-        defaults += [(name, one) for name, one in zip(names[n:], given.kw_defaults) if one]
+        defaults += [(name, value) for name, value in zip(names[n:], given.kw_defaults) if value]
         values = {}
         for name, default in defaults:
             value = self._sometimes(partial(self.fitting, wanted=types[name]), default)
@@ -861,23 +861,23 @@ class _Builder:
         elif (
             isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
             and len(target.elts) == len(value.elts)
-            and not any(isinstance(one, ast.Starred) for one in value.elts)
+            and not any(isinstance(element, ast.Starred) for element in value.elts)
         ):  # fmt: skip
             pairs = [*zip(target.elts, value.elts)]
             if _names(target) & _names(value):
                 # All values are computed before the first is stored.
                 values = [
-                    self._kept(self.expression(one), f"next_{i}")
-                    for i, (_, one) in enumerate(pairs)
+                    self._kept(self.expression(element), f"next_{i}")
+                    for i, (_, element) in enumerate(pairs)
                 ]
-                for (one, _), held in zip(pairs, values):
-                    found += self._take_apart(one, held)
-            elif all(isinstance(one, ast.Name) and one.id != "_" for one, _ in pairs):
-                made = [(ast.unparse(one), self.expression(other)) for one, other in pairs]
+                for (element, _), held in zip(pairs, values):
+                    found += self._take_apart(element, held)
+            elif all(isinstance(name, ast.Name) and name.id != "_" for name, _ in pairs):
+                made = [(ast.unparse(name), self.expression(element)) for name, element in pairs]
                 found.append(self._store(target, made))
             else:
-                for one, other in pairs:
-                    self._assign(one, other, found)
+                for name, element in pairs:
+                    self._assign(name, element, found)
         else:
             made_of = self.expression(value)
             # Store the value if an assignment could change parts that are read later.
@@ -923,8 +923,8 @@ class _Builder:
         parts = self._parts_of(target, value)
         if len(parts) != len(target.elts):
             raise _Outside(target, f"{len(target.elts)} names for {len(parts)} values")
-        for one, part in zip(target.elts, parts):
-            yield from self._taken_apart(one, part)
+        for name, part in zip(target.elts, parts):
+            yield from self._taken_apart(name, part)
 
     def _parts_of(self, node: ast.AST, value: Expression) -> list[Expression]:
         """Return the elements of a value."""
@@ -1008,8 +1008,8 @@ class _Builder:
         kind = self._global_value(call.func)
         is_known = is_class(kind, BaseException) and issubclass(kind, _EXCEPTIONS)
         changed = [
-            value for one in getattr(kind, "__mro__", ()) if one is not Refusal
-            for value in vars(one).values() if isinstance(value, FunctionType)
+            value for base in getattr(kind, "__mro__", ()) if base is not Refusal
+            for value in vars(base).values() if isinstance(value, FunctionType)
         ]  # fmt: skip
         if not is_known or changed or kind.__str__ is not BaseException.__str__:
             what = ast.unparse(call.func)
@@ -1134,9 +1134,9 @@ class _Builder:
         hold: _Hold,
     ) -> tuple[list[tuple[str, Expression]], int]:
         """Return the names and values of `zip` and `enumerate`."""
-        starts = [one for one in call.keywords if called is enumerate and one.arg == "start"]
-        given = [*call.args, *(one.value for one in starts)]
-        others = [one for one in call.keywords if one not in starts]
+        starts = [named for named in call.keywords if called is enumerate and named.arg == "start"]
+        given = [*call.args, *(named.value for named in starts)]
+        others = [named for named in call.keywords if named not in starts]
         self._check_plain(ast.copy_location(ast.Call(call.func, given, others), call),
                           called.__name__)  # fmt: skip
         if not isinstance(target, ast.Tuple):
@@ -1146,7 +1146,7 @@ class _Builder:
             if len(names) != len(given) or not given:
                 raise _Outside(target, "another number of names than zip has parts")
             pairs = [self._items(t, i, place, hold) for t, i in zip(names, given)]
-            return [one for bound, _ in pairs for one in bound], min(n for _, n in pairs)
+            return [binding for bound, _ in pairs for binding in bound], min(n for _, n in pairs)
         if len(names) != 2 or not 1 <= len(given) <= 2:
             raise _Outside(target, "enumerate of other than two names, and a start")
         first = self._size(given[1]) if given[1:] else 0
@@ -1261,15 +1261,15 @@ class _Builder:
             operand = self._folded(node.operand)
             return None if operand is None else -operand
         if isinstance(node, ast.BinOp) and type(node.op) in _FOLDED:
-            one, other = self._folded(node.left), self._folded(node.right)
-            if one is None or other is None:
+            left, right = self._folded(node.left), self._folded(node.right)
+            if left is None or right is None:
                 return None
             with suppress(ArithmeticError):
-                return _FOLDED[type(node.op)](one, other)
+                return _FOLDED[type(node.op)](left, right)
             return None
         if (
             isinstance(node, ast.Call) and self._global_value(node.func) is len
-            and not any(isinstance(one, ast.Call) for x in node.args for one in ast.walk(x))
+            and not any(isinstance(part, ast.Call) for x in node.args for part in ast.walk(x))
         ):  # fmt: skip
             found = self.expression(node)
             return int(found.value) if isinstance(found, Number) else None
@@ -1323,7 +1323,7 @@ class _Builder:
             raise _Outside(node, f"{what} is not a value: name a part of it")
         if callable(value):
             raise self._cannot(node, f"the name {ast.unparse(node)}")
-        if any(value is getattr(math, one) for one in CONSTANTS):
+        if any(value is getattr(math, constant) for constant in CONSTANTS):
             return Number(value, FLOAT)
         owner = self._global_value(node.value) if isinstance(node, ast.Attribute) else None
         module = owner.__name__ if isinstance(owner, ModuleType) else self.scope["__name__"]
@@ -1441,7 +1441,7 @@ class _Builder:
             if isinstance(node, ast.Starred):
                 parts = self._unpacked(node.value)
                 wanted = [*types[len(values) :], *[None] * len(parts)]
-                values += [self._fit(node, *one) for one in zip(parts, wanted)]
+                values += [self._fit(node, *pair) for pair in zip(parts, wanted)]
             else:
                 wanted = [*types[len(values) :], None]
                 values.append(make(node, wanted[0]))
@@ -1493,8 +1493,8 @@ class _Builder:
 
     def _of_arrays(self, node: ast.BinOp, left: Expression, right: Expression) -> Expression:
         operands = [
-            self._number(one, value) if is_number(value.type) else value
-            for one, value in ((node.left, left), (node.right, right))
+            self._number(side, value) if is_number(value.type) else value
+            for side, value in ((node.left, left), (node.right, right))
         ]
         found = arrays.binary(self.program.functions, node.op, operands[0], operands[1])
         if found is None:
@@ -1536,11 +1536,11 @@ class _Builder:
         return value
 
     def _boolop(self, node: ast.BoolOp, wanted: Type | None) -> Expression:
-        def of_bool(one: ast.expr) -> Expression:
-            value = self.expression(one)
+        def of_bool(operand: ast.expr) -> Expression:
+            value = self.expression(operand)
             if value.type != BOOL:
                 what = f"{value.type.word} before or after and, or: write a comparison"
-                raise _Outside(one, what)
+                raise _Outside(operand, what)
             return value
 
         return self._joined(node, of_bool)
@@ -1553,33 +1553,38 @@ class _Builder:
     def _compare(self, node: ast.Compare, wanted: Type | None) -> Expression:
         nodes = [node.left, *node.comparators]
         values = [self.expression(nodes[0]), self.expression(nodes[1])]
-        values += [self._sometimes(self.expression, one) for one in nodes[2:]]
+        values += [self._sometimes(self.expression, operand) for operand in nodes[2:]]
         parts = []
-        for op, left, right, one, other in zip(node.ops, nodes, nodes[1:], values, values[1:]):
+        for op, left, right, left_value, right_value in zip(
+            node.ops, nodes, nodes[1:], values, values[1:]
+        ):
             if type(op) not in _COMPARISONS:
                 raise self._cannot(node, "a comparison other than of size")
-            for side, value in ((left, one), (right, other)):
+            for side, value in ((left, left_value), (right, right_value)):
                 if not is_number(value.type):
                     raise _Outside(side, f"a comparison of {value.type.word}")
-            if FLOAT in (one.type, other.type):
-                one, other = self._number(left, one), self._number(right, other)
-            parts.append(Operation(_COMPARISONS[type(op)], (one, other), BOOL))
+            if FLOAT in (left_value.type, right_value.type):
+                left_value, right_value = (
+                    self._number(left, left_value),
+                    self._number(right, right_value),
+                )
+            parts.append(Operation(_COMPARISONS[type(op)], (left_value, right_value), BOOL))
         return parts[0] if len(parts) == 1 else Operation(tree.AND, parts, BOOL)
 
     def _ifexp(self, node: ast.IfExp, wanted: Type | None) -> Expression:
         test = self.condition(node.test)
-        one, other = (
+        this, other = (
             self._sometimes(lambda side: self.expression(side, wanted), side)
             for side in (node.body, node.orelse)
         )
-        if FLOAT in (one.type, other.type):
-            one = self._fit(node.body, one, FLOAT)
+        if FLOAT in (this.type, other.type):
+            this = self._fit(node.body, this, FLOAT)
             other = self._fit(node.orelse, other, FLOAT)
-        elif one.type != other.type and INT in (one.type, other.type):
+        elif this.type != other.type and INT in (this.type, other.type):
             # A member of an enumeration is converted to the other value's type, int.
-            one, other = self._fit(node.body, one, INT), self._fit(node.orelse, other, INT)
-            return Choice(test, _as_int(one), _as_int(other))
-        return Choice(test, one, self._fit(node.orelse, other, one.type))
+            this, other = self._fit(node.body, this, INT), self._fit(node.orelse, other, INT)
+            return Choice(test, _as_int(this), _as_int(other))
+        return Choice(test, this, self._fit(node.orelse, other, this.type))
 
     # Calls
 
@@ -1670,7 +1675,9 @@ class _Builder:
             if not is_number(value.type):
                 raise _Outside(argument, f"{word} of {value.type.word}")
         if any(value.type == FLOAT for value in values):
-            values = [self._fit(one, value, FLOAT) for one, value in zip(node.args, values)]
+            values = [
+                self._fit(argument, value, FLOAT) for argument, value in zip(node.args, values)
+            ]
         elif any(value.type != values[0].type for value in values):
             values = [*map(_as_int, values)]
         found = values[0]
@@ -1769,9 +1776,9 @@ class _Builder:
         else:
             element = inner.expression(node.elt)
             check_size(f"a tuple of {turns}", turns)
-            one = tuple_of([element.type])
-            assert isinstance(one, Array)
-            type_ = replace(one, n=turns)
+            single = tuple_of([element.type])
+            assert isinstance(single, Array)
+            type_ = replace(single, n=turns)
         elements = Local(inner._unused("elements"), type_)
         before: list[Statement] = [tree.Reserve(elements.name, type_)]
         counts = _value(each.loop.start) == 0 and each.loop.step == 1
@@ -1808,10 +1815,10 @@ class _Builder:
             if each.block is not each.turn or not loop.turns:
                 raise _Outside(node, f"{word} of a number of values that is not a constant above 0")
             found = Local(inner._unused("found"), value.type)
-            one = Local(inner._unused("each"), value.type)
-            each.block.append(tree.Store([(one.name, value)]))
+            element = Local(inner._unused("each"), value.type)
+            each.block.append(tree.Store([(element.name, value)]))
             is_first = Operation(tree.EQUAL, (loop.counter, loop.start), BOOL)
-            next_ = Choice(is_first, one, arrays.extreme_of_two(word, found, one))
+            next_ = Choice(is_first, element, arrays.extreme_of_two(word, found, element))
         each.block.append(tree.Store([(found.name, next_)]))
         zero = Number(0.0, FLOAT) if found.type == FLOAT else int_of(0)
         return each.call([tree.Store([(found.name, zero)])], found)
@@ -1924,22 +1931,26 @@ class _Builder:
         with suppress(Exception):  # reported where it is translated
             hints = hints_of(called)
         parameters = inspect.signature(called).parameters.values()
-        unsized = [one.name for one in parameters if has_no_size(hints.get(one.name))]
+        unsized = [
+            parameter.name for parameter in parameters if has_no_size(hints.get(parameter.name))
+        ]
         if unsized:
             function = None
             types = {
-                one.name: None if one.name in unsized else type_of(hints[one.name])
-                for one in parameters
-                if one.name in hints
+                parameter.name: None
+                if parameter.name in unsized
+                else type_of(hints[parameter.name])
+                for parameter in parameters
+                if parameter.name in hints
             }
         else:
             function = self.program.function(called)
             types = {**function.arguments}
-        kinds = [one.kind for one in parameters]
+        kinds = [parameter.kind for parameter in parameters]
         takes = _Signature(
             called.__module__, called.__name__, types, kinds.count(Parameter.POSITIONAL_ONLY),
             len(kinds) - kinds.count(Parameter.KEYWORD_ONLY),
-            {one.name: one.default for one in parameters if one.default is not one.empty},
+            {x.name: x.default for x in parameters if x.default is not x.empty},
         )  # fmt: skip
         given = self._given(node, takes)
         for name in unsized:
@@ -2014,7 +2025,7 @@ class _Noting:
             error = _Outside(ast.Pass(), _TOO_DEEP)
         if isinstance(error, (_Outside, TypeError)):
             node = error.node if isinstance(error, _Outside) else self._node
-            places = (getattr(one, "lineno", 0) for one in (node, self._node, builder.node))
+            places = (getattr(origin, "lineno", 0) for origin in (node, self._node, builder.node))
             line = next(filter(None, places), 0)
             builder.program.refuse(f"{builder.path}:{line}: ", str(error))
             builder.has_mistakes = True
@@ -2025,13 +2036,13 @@ class _Noting:
         return True
 
 
-def _both(one: _Known | None, other: _Known | None) -> _Known | None:
+def _both(first: _Known | None, second: _Known | None) -> _Known | None:
     """Return the names known on both of two paths, with the same type; None if unreachable."""
-    if one is None or other is None:
-        return one if other is None else other
-    types = {name: {type_, other[name]} for name, type_ in one.items() if name in other}
+    if first is None or second is None:
+        return first if second is None else second
+    types = {name: {type_, second[name]} for name, type_ in first.items() if name in second}
     return {
-        name: UNKNOWN if UNKNOWN in both else one[name]
+        name: UNKNOWN if UNKNOWN in both else first[name]
         for name, both in types.items()
         if len(both) == 1 or UNKNOWN in both
     }
@@ -2056,9 +2067,9 @@ def _stem(name: str) -> str:
     return found if found.isidentifier() else ""
 
 
-def _value(one: Expression) -> int | None:
+def _value(expression: Expression) -> int | None:
     """Return the value of a literal; None for other expressions."""
-    return one.value if isinstance(one, Number) else None
+    return expression.value if isinstance(expression, Number) else None
 
 
 def _count(first: int, place: Expression, step: int) -> Expression:
@@ -2094,8 +2105,8 @@ def _as_int(value: Expression) -> Expression:
 #: Translations of calls of built-in functions.
 _BUILT_IN: Mapping[Any, Callable[[_Builder, ast.Call], Expression]] = {
     len: _Builder._len,
-    **{one: partial(_Builder._of_number, name=one.__name__)
-       for one in (abs, bool, float, int, round)},
-    **{one: partial(_Builder._extreme, word=one.__name__) for one in (max, min)},
-    **{one: partial(_Builder._of_generator, word=one.__name__) for one in (all, any, sum)},
+    **{known: partial(_Builder._of_number, name=known.__name__)
+       for known in (abs, bool, float, int, round)},
+    **{known: partial(_Builder._extreme, word=known.__name__) for known in (max, min)},
+    **{known: partial(_Builder._of_generator, word=known.__name__) for known in (all, any, sum)},
 }  # fmt: skip

@@ -112,7 +112,7 @@ class ReducerText:
 
     def _call(self, hook: str, **given: str) -> str:
         function = self.program.function(self.reducer.hooks[hook])
-        return self.emitter.call(function, [given.get(one, one) for one in function.arguments])
+        return self.emitter.call(function, [given.get(name, name) for name in function.arguments])
 
 
 _ROWS = """\
@@ -176,7 +176,7 @@ def text_over_rows(reducer: Reducer) -> str | None:
     if program.mistakes:
         return None
     emitter = Emitter(program.functions.values())
-    one = ReducerText(reducer, program, emitter, emitter.unused(f"{reducer.name}_index"))
-    functions, rows = [*one.text()], one.over_rows()
+    text = ReducerText(reducer, program, emitter, emitter.unused(f"{reducer.name}_index"))
+    functions, rows = [*text.text()], text.over_rows()
     head = '#include "arithmetic.h"\n\n#define APART static'
-    return "\n\n".join([head, emitter.text(), one.structure(), *functions, rows, _WHY])
+    return "\n\n".join([head, emitter.text(), text.structure(), *functions, rows, _WHY])

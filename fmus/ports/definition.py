@@ -141,15 +141,15 @@ def _fed_through(
     for field, ports in outputs.items():
         for port in ports:
             place = (behaviour.outputs.__name__, field)
-            for one in (*port.feedthrough, *(port.initially or ())):
-                if one not in names:
-                    why = f"depends on {one!r}; there are {', '.join(names)}"
+            for dependency in (*port.feedthrough, *(port.initially or ())):
+                if dependency not in names:
+                    why = f"depends on {dependency!r}; there are {', '.join(names)}"
                     raise Misdeclared(f"{'.'.join(place)} {why}", *place)
-            direct = tuple(name for one in port.feedthrough for name in names[one])
+            direct = tuple(name for dependency in port.feedthrough for name in names[dependency])
             if behaviour.is_sampled and not {*direct} - {TIME.name}:
                 why = "is sampled with the inputs, so it has feedthrough; leave out feedthrough=()"
                 raise Misdeclared(f"{'.'.join(place)} {why}", *place)
-            initial = (name for one in port.initially or () for name in names[one])
+            initial = (name for dependency in port.initially or () for name in names[dependency])
             yield replace(
                 port,
                 variability="discrete" if behaviour.is_sampled else port.variability,

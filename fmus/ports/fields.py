@@ -111,9 +111,9 @@ def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner:
         example = f'{place[-1]}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
         raise _wrong(place, f"has no unit and no description; write {example}")
     [variable] = found
-    for name, of in _ONLY.items():
-        if getattr(variable, name) not in (None, False) and causality != of:
-            raise _wrong(place, f"is no {of}, and {name} is for {of}s")
+    for name, role in _ONLY.items():
+        if getattr(variable, name) not in (None, False) and causality != role:
+            raise _wrong(place, f"is no {role}, and {name} is for {role}s")
     if causality == "output" and (variable.minimum, variable.maximum) != (None, None):
         raise _wrong(place, "is an output; minimum and maximum are for inputs and parameters")
     for name in ("feedthrough", "initially"):
@@ -265,7 +265,7 @@ def _fmi_type(part: _Part, place: tuple[str, ...]) -> tuple[str, Any, dict[str, 
     start = members[0] if start is None else start
     if not isinstance(start, number):
         raise _wrong(place, f"starts with {start!r:.40}, which is no {number.__name__}")
-    choices = {one.name.lower(): one for one in members}
+    choices = {member.name.lower(): member for member in members}
     if len(choices) < len(members):
         raise _wrong(place, f"has choices of {number.__name__} that differ only in capitals")
     return "Enumeration", int(start), choices

@@ -70,7 +70,7 @@ class Reducer:
 
 def is_reducer(module: ModuleType) -> bool:
     """Return True if a module has what only an index has."""
-    hooks = [one for name, one in vars(module).items() if name in HOOKS and callable(one)]
+    hooks = [hook for name, hook in vars(module).items() if name in HOOKS and callable(hook)]
     taken = {argument for hook in hooks for argument in getattr(hook, "__annotations__", ())}
     return "LAST" in vars(module) or bool(taken & {"before", "acting", "begin", "end"})
 
@@ -124,7 +124,9 @@ def _results(outputs: Any) -> dict[str, tuple[Port, ...]]:
 
 
 def _meaning(outputs: Any, field: str) -> str:
-    [variable] = (one for one in split(fields_of(outputs)[field])[1] if isinstance(one, Variable))
+    [variable] = (
+        note for note in split(fields_of(outputs)[field])[1] if isinstance(note, Variable)
+    )
     return str(variable.description)
 
 

@@ -61,7 +61,7 @@ def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dic
             # A star may stand for any module of the package.
             package = name[:-2]
             for place in places.get(package, ()):
-                wanted += (f"{package}.{it.stem}" for it in sorted(Path(place).glob("*.py")))
+                wanted += (f"{package}.{path.stem}" for path in sorted(Path(place).glob("*.py")))
         elif name not in places:
             wanted += imported_by(name)
     return files
@@ -132,14 +132,16 @@ def with_other_imports(content: bytes, names: Collection[str], suffix: str) -> b
     """
     text, added = decode_source(content).encode(), suffix.encode()
     changed = text
-    for one in reversed(_imports(text)):
-        if one.top not in names:
+    for imported in reversed(_imports(text)):
+        if imported.top not in names:
             continue
-        if one.bound and one.is_within:
-            more = b", " + one.bound + added + b" as " + one.bound
-            changed = changed[: one.whole_end] + more + changed[one.whole_end :]
-        name = added + (b" as " + one.bound if one.bound and not one.is_within else b"")
-        changed = changed[: one.end] + name + changed[one.end :]
+        if imported.bound and imported.is_within:
+            more = b", " + imported.bound + added + b" as " + imported.bound
+            changed = changed[: imported.whole_end] + more + changed[imported.whole_end :]
+        name = added + (
+            b" as " + imported.bound if imported.bound and not imported.is_within else b""
+        )
+        changed = changed[: imported.end] + name + changed[imported.end :]
     if changed == text:
         return content
     encoding, _ = tokenize.detect_encoding(io.BytesIO(content).readline)
@@ -169,4 +171,4 @@ def _imports(text: bytes) -> list[_Import]:
             end = begins[alias.end_lineno - 1] + alias.end_col_offset
             bound = b"" if alias.asname else name[0]
             found.append(_Import(top, name.end(), bound, bool(others), end))
-    return sorted(found, key=lambda one: one.end)
+    return sorted(found, key=lambda imported: imported.end)

@@ -65,7 +65,7 @@ def _check(resources: str, guid: str) -> None:
 def _stamps(files: list[str]) -> list[tuple[int, int, int]]:
     """Return numbers of files that differ after a change."""
     found = map(os.stat, files)
-    return [(it.st_ino, it.st_size, it.st_mtime_ns) for it in found]
+    return [(stat.st_ino, stat.st_size, stat.st_mtime_ns) for stat in found]
 
 
 def _examined(resources: str) -> _Sound:
