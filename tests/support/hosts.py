@@ -47,8 +47,8 @@ def unpacked(fmus: Path, folder: Path, names: Sequence[str] = NAMES) -> list[str
 
 def libraries_of(binary: Path) -> list[Path]:
     """The shared libraries that a binary is linked against, and the dynamic loader."""
-    said = subprocess.run(["ldd", binary], check=True, capture_output=True, text=True).stdout
-    return [Path(word) for word in said.split() if word.startswith("/")]
+    output = subprocess.run(["ldd", binary], check=True, capture_output=True, text=True).stdout
+    return [Path(word) for word in output.split() if word.startswith("/")]
 
 
 def bare_root(folder: Path, *binaries: Path) -> list[str]:

@@ -213,14 +213,16 @@ def test_other_library_is_refused(other: bytes):
 def test_command_file_knows_it(tmp_path: Path):
     path = tmp_path / "library"
     path.write_bytes(universal([thin(name, 100) for name in PROCESSORS]))
-    said = subprocess.run(["file", path], check=True, capture_output=True, text=True).stdout
-    assert "universal binary with 2 architectures" in said
-    assert "x86_64" in said
-    assert "arm64" in said
+    output = subprocess.run(["file", path], check=True, capture_output=True, text=True).stdout
+    assert "universal binary with 2 architectures" in output
+    assert "x86_64" in output
+    assert "arm64" in output
 
 
 def test_compilers_evaluate_no_function_whose_result_is_rounded():
-    rounded = {name for name, one in FUNCTIONS.items() if one.is_rounded and not one.factor}
+    rounded = {
+        name for name, function in FUNCTIONS.items() if function.is_rounded and not function.factor
+    }
     assert set(ROUNDED) == rounded
 
 
