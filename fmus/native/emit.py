@@ -691,8 +691,8 @@ def _used(statement: Statement, deep: bool = True) -> Iterator[str]:
 
 def _stores(statements: Sequence[Statement]) -> Iterator[str]:
     """Yield the variables that are assigned, each time; twice for changes of elements."""
-    for one in tree.statements_in(statements):
-        yield from tree.stored_in(one) * (1 + isinstance(one, (tree.StoreItem, tree.Reserve)))
+    for statement in tree.statements_in(statements):
+        yield from tree.stored_in(statement) * (1 + isinstance(statement, (tree.StoreItem, tree.Reserve)))
 
 
 def _variables(function: Function) -> Iterator[str]:

@@ -171,8 +171,8 @@ def test_single_precision_over_the_whole_of_fig4(programs: Path):
 def test_two_programs_are_linked_into_one(programs: Path, tmp_path: Path):
     (tmp_path / "both.c").write_text(BOTH, encoding="utf-8")
     folders = [programs / "fig4", programs / "path-single"]
-    compile_c(GCC, *STRICT, *EXACT, *(f"-I{place}" for place in folders), tmp_path / "both.c",
-              *(sources(place)[0] for place in folders), "-o", tmp_path / "both", "-lm")  # fmt: skip
+    compile_c(GCC, *STRICT, *EXACT, *(f"-I{path}" for path in folders), tmp_path / "both.c",
+              *(sources(path)[0] for path in folders), "-o", tmp_path / "both", "-lm")  # fmt: skip
     output = subprocess.run([tmp_path / "both"], check=True, capture_output=True, text=True).stdout
     times_and_places = [float(word) for word in output.split()]
     quiet = simulate("fig4", {"plant.noise.std": 0.0}, stop_time=2.0, kind="native")
