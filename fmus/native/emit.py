@@ -692,7 +692,8 @@ def _used(statement: Statement, deep: bool = True) -> Iterator[str]:
 def _stores(statements: Sequence[Statement]) -> Iterator[str]:
     """Yield the variables that are assigned, each time; twice for changes of elements."""
     for statement in tree.statements_in(statements):
-        yield from tree.stored_in(statement) * (1 + isinstance(statement, (tree.StoreItem, tree.Reserve)))
+        is_twice = isinstance(statement, (tree.StoreItem, tree.Reserve))
+        yield from tree.stored_in(statement) * (1 + is_twice)
 
 
 def _variables(function: Function) -> Iterator[str]:
