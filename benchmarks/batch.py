@@ -96,8 +96,8 @@ def check(n: int) -> None:
         space = Space(study, {name: load_scenario(name, NATIVE) for name in study.scenario})
         points = [space[number] for number in Random(name).sample(range(len(space)), n)]
         same = sum(
-            bool(expected.failure) if found.failure == REFUSED else found == expected
-            for found, expected in zip(batch.outcomes(points), fmus.outcomes(points), strict=True)
+            bool(expected.failure) if outcome.failure == REFUSED else outcome == expected
+            for outcome, expected in zip(batch.outcomes(points), fmus.outcomes(points), strict=True)
         )
         print(f"{name:12} {same} of {n} runs are the same", flush=True)
 

@@ -163,21 +163,21 @@ class Row(NamedTuple):
             self.begin(name).steps(self.h, steps)
             changes[name] = {output: instance.number(output) - x for output, x in before.items()}
         expected, *others = changes.values()
-        for found in others:
-            common = expected.keys() & found.keys()
+        for other in others:
+            common = expected.keys() & other.keys()
             close = partial(isclose, rel_tol=tolerance, abs_tol=tolerance)
-            if not common or not all(close(expected[y], found[y]) for y in common):
+            if not common or not all(close(expected[y], other[y]) for y in common):
                 raise SystemExit(f"not the same numbers: {changes}")
 
     def times(self, steps: int, repetitions: int, runs: int = 1) -> dict[str, list[float]]:
         """Microseconds of a step in each turn, in which native FMUs make some runs."""
-        found: dict[str, list[float]] = {name: [] for name in self.instances}
+        times: dict[str, list[float]] = {name: [] for name in self.instances}
         for _ in range(repetitions):
             for name in self.instances:
                 n = runs if name == "native" else 1
                 seconds = sum(self.begin(name).steps(self.h, steps) for _ in range(n))
-                found[name].append(1e6 * seconds / n / steps)
-        return found
+                times[name].append(1e6 * seconds / n / steps)
+        return times
 
 
 def loops(folder: Path) -> ctypes.CDLL:
@@ -197,7 +197,7 @@ def ratio(times: Mapping[str, Sequence[float]], slow: str, fast: str) -> float:
 def rows(folder: Path, names: Sequence[str], calls: ctypes.CDLL) -> Iterator[tuple[str, Row]]:
     """Both kinds of each example, and its plain slave if there is one."""
     for name in names:
-        found = {
+        instances = {
             called: Instance(build(name, kind, "2", folder / called), folder / called / name, calls)
             for called, kind in (("native", "native"), ("Python", "python"))
         }
@@ -206,10 +206,10 @@ def rows(folder: Path, names: Sequence[str], calls: ctypes.CDLL) -> Iterator[tup
             plain = folder / "plain"
             plain.mkdir(exist_ok=True)
             fmu = Path(FmuBuilder.build_FMU(script, dest=plain))
-            found["plain"] = Instance(fmu, plain / name, calls)
-        declared = found["native"].description.defaultExperiment.stepSize
+            instances["plain"] = Instance(fmu, plain / name, calls)
+        declared = instances["native"].description.defaultExperiment.stepSize
         h = SOLVER_STEPS.get(name, float(declared))
-        yield name, Row(h, found, dict.fromkeys(found, OURS.get(name, {})))
+        yield name, Row(h, instances, dict.fromkeys(instances, OURS.get(name, {})))
 
 
 def references(folder: Path, given: Path, calls: ctypes.CDLL) -> Iterator[tuple[str, Row]]:

@@ -430,9 +430,11 @@ def needed(library: str) -> list[str]:
         check=True,
         timeout=60,
     )
-    found = [line.split("[")[1][:-1] for line in dynamic.stdout.splitlines() if "(NEEDED)" in line]
-    found = [name for name in found if not name.startswith("ld-")]
-    return [*found, "Python's symbols"] if " Py_" in symbols.stdout else found
+    libraries = [
+        line.split("[")[1][:-1] for line in dynamic.stdout.splitlines() if "(NEEDED)" in line
+    ]
+    libraries = [name for name in libraries if not name.startswith("ld-")]
+    return [*libraries, "Python's symbols"] if " Py_" in symbols.stdout else libraries
 
 
 def problems(fmu: Path) -> int:
@@ -473,7 +475,7 @@ def measured(fmu: Path) -> dict[str, object]:
         os.killpg(process.pid, SIGKILL)
     process.wait()
     with os.fdopen(reading, encoding="utf-8") as lines:
-        found = {k: v for line in lines for k, v in json.loads(line).items()}
+        values = {k: v for line in lines for k, v in json.loads(line).items()}
     labels = {
         "first": "first instance [ms]",
         "further": "further instances [ms]",
@@ -482,7 +484,7 @@ def measured(fmu: Path) -> dict[str, object]:
         "nan": "NaN as input",
     }
     return {
-        **{labels[k]: round(v, 3) if isinstance(v, float) else v for k, v in found.items()},
+        **{labels[k]: round(v, 3) if isinstance(v, float) else v for k, v in values.items()},
         "the process ended with": ended,
     }
 
@@ -514,13 +516,13 @@ def main() -> None:
                 print(f"    cannot be built: {error}")
                 continue
             sleep(APART)
-            found = {
+            results = {
                 **inside(fmu),
                 "validate_fmu [problems]": problems(fmu),
                 "built twice": differences(fmu, build(Path(other))),
                 **measured(fmu),
             }
-        for label, value in found.items():
+        for label, value in results.items():
             print(f"    {label:24} {value}", flush=True)
 
 

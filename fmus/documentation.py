@@ -143,16 +143,16 @@ def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
         ("output", "Outputs"),
         ("parameter", "Parameters"),
     ):
-        found = [port for port in ports if port.causality == causality]
-        if not found:
+        chosen = [port for port in ports if port.causality == causality]
+        if not chosen:
             continue
         columns = ["name", "unit or type", "description"]
         if causality == "parameter":
             columns[2:2] = ["start", "range"]
-        elif any(port.feedthrough for port in found):
+        elif any(port.feedthrough for port in chosen):
             columns.append("direct feedthrough from")
         lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-        rows = (_row(ports, types)[: len(columns)] for ports in _alike(found))
+        rows = (_row(ports, types)[: len(columns)] for ports in _alike(chosen))
         lines += ["| " + " | ".join(row) + " |" for row in rows]
         yield f"## {heading}\n\n" + "\n".join(lines)
 
@@ -173,8 +173,8 @@ def _alike(ports: Sequence[Port]) -> Iterable[list[list[Port]]]:
 
 def _described(port: Port) -> str:
     """Return the description without the name of a member at its end."""
-    found = _MEMBER.search(port.name)
-    end = f": {found[0].strip('.[]')}" if found else ""
+    match = _MEMBER.search(port.name)
+    end = f": {match[0].strip('.[]')}" if match else ""
     return port.description.removesuffix(end).replace("|", r"\|")
 
 

@@ -300,10 +300,10 @@ def continuous(system: System, stop: float) -> np.ndarray:
         return np.array([*flat(moving), *(0.0 for _ in flat((state.tau, state.water))), *rest])
 
     times = STEP * np.arange(round(stop / STEP) + 1)
-    found = solve_ivp(
+    solution = solve_ivp(
         rates, (0.0, stop), flat(start), "DOP853", t_eval=times, rtol=1e-9, atol=1e-11
     )
-    states = zip(found.t, found.y.T, strict=True)
+    states = zip(solution.t, solution.y.T, strict=True)
     return np.array([unpacked(t, x)[2].plant.y for t, x in states])
 
 
@@ -809,8 +809,8 @@ STATISTICS: Mapping[str, Callable[..., str]] = {
 def queries(study: str) -> dict[str, Any]:
     """The part of page_numbers.toml about a study."""
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    found: dict[str, Any] = tomllib.loads(text)[study]
-    return found
+    table: dict[str, Any] = tomllib.loads(text)[study]
+    return table
 
 
 def lines_of(study: str) -> list[str]:

@@ -305,16 +305,16 @@ class _WithoutNull(GenerateJsonSchema):
 def paper() -> dict[str, str]:
     """Numbers in docs/explanation/paper.md."""
     vehicle = Vehicle()
-    found = theorem(vehicle, ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
-    k, there = coupling(vehicle, ELL), found.bounds.lambda_d2
-    speed, power = found.speed_of_any_gains, found.alpha_1_of_any_gains
+    result = theorem(vehicle, ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
+    k, there = coupling(vehicle, ELL), result.bounds.lambda_d2
+    speed, power = result.speed_of_any_gains, result.alpha_1_of_any_gains
     turning = vehicle.m55 / ELL**3
     skew = (vehicle.m66 / ELL**2 - vehicle.m11) / ELL
-    of_theta = found.bounds.lambda_M2
+    of_theta = result.bounds.lambda_M2
     slow = theorem(vehicle, ELL, Gains(lambda_=0.1), MAXIMUM_SLOPE[Saturation.TANH], 0.05)
     sigma = Gains().sigma
     return {
-        "theorem": "```text\n" + "\n".join(stated(found)) + "\n```",
+        "theorem": "```text\n" + "\n".join(stated(result)) + "\n```",
         "missing_force": f"{0.1 * turning * vehicle.m11 / vehicle.m33:.1f}",
         "skew_part": f"{0.2 * skew:.0f}",
         "power_of_p2_2": f"{-0.5 * vehicle.m66 / ELL**3:.0f}",
@@ -324,19 +324,19 @@ def paper() -> dict[str, str]:
         "zetas_when_slow": f"{slow.conditions[1].least:.1f}",
         "k_d_when_slow": f"{slow.conditions[2].least:.1f}",
         "x_when_slow": f"{slow.x_of_any_gains:.2f}",
-        "zetas_of_any_gains": f"{found.zeta_of_any_gains:.1f}",
+        "zetas_of_any_gains": f"{result.zeta_of_any_gains:.1f}",
         "coupling": f"{k:.1f}",
         "quarter_of_the_coupling": f"{0.25 * k:.1f}",
         "largest_speed": f"{speed:.2f}",
         "largest_lambda": f"{2.0 * speed:.2f}",
         # With vanishing gains (31) asks for k / 4 < d11, and k falls with the cube of ell.
-        "least_ell": f"{ELL * cbrt(found.zeta_of_any_gains / there):.2f}",
+        "least_ell": f"{ELL * cbrt(result.zeta_of_any_gains / there):.2f}",
         "ball": f"{ball(0.0, 1.0, sigma):.1f}",
         "ball_of_theta": f"{ball(of_theta, 1.0, sigma):.0f}",
         "largest_alpha_1": f"{power:.3f}",
         "largest_eps_t": f"{power / 3.0:.2f}",
-        "x_of_any_gains": f"{found.x_of_any_gains:.2f}",
-        "x_at_most": f"{found.x_at_most:.2f}",
+        "x_of_any_gains": f"{result.x_of_any_gains:.2f}",
+        "x_at_most": f"{result.x_at_most:.2f}",
     }
 
 

@@ -61,22 +61,22 @@ every archive what its run reported. Files with the same bytes count once.
 """
 
 
-def page(found: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
+def page(files: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
     """Text of the page."""
     head = _HEAD.format(steps=STEPS, host=lines_of_host, tools=" and ".join(_tools()))
-    there = [file for file in found if file["outcome"] != "absent"]
+    there = [file for file in files if file["outcome"] != "absent"]
     archives = [file for file in there if not file["is_fmu"]]
     fmus = [file for file in there if file["is_fmu"]]
     parts = [head.rstrip("\n"), *_archives(archives), *_fmus(fmus), *_parameters(fmus)]
     return "\n".join([*parts, *_not_running(archives, fmus), ""])
 
 
-def listed(found: Sequence[Mapping[str, Any]]) -> str:
+def listed(files: Sequence[Mapping[str, Any]]) -> str:
     """Table of files in CSV: reasons of those that do not run, and messages of archives."""
     text = StringIO()
     table = writer(text, lineterminator="\n")
     table.writerow(("kind", "file", "outcome"))
-    for file in found:
+    for file in files:
         kind = "FMU" if file["is_fmu"] else "archive"
         changed = file.get("changed", {})
         if changed.get("lost"):

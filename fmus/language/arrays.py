@@ -81,10 +81,10 @@ def _each(functions: Functions, name: str, operator: tree.Operator, *types: Type
 
 def _at(name: str, type_: Type, places: Sequence[Expression]) -> Expression:
     """Return an element of an argument."""
-    found: Expression = Local(name, type_)
+    element: Expression = Local(name, type_)
     for place in places:
-        found = Item(found, place)
-    return found
+        element = Item(element, place)
+    return element
 
 
 def _loops(counters: Sequence[Local], n: Sequence[int], inner: Statement) -> Sequence[Statement]:

@@ -181,9 +181,9 @@ class Program:
 
     def refuse(self, place: str, what: str) -> None:
         """Note a mistake; only the first one of each line, since others follow from it."""
-        found = PLACED.match(what)
-        if found:
-            place, what = found[0], what[found.end() :]
+        match = PLACED.match(what)
+        if match:
+            place, what = match[0], what[match.end() :]
         self._mistakes.setdefault(place, what)
 
     def function(self, function: FunctionType, types: Sequence[Type] = ()) -> Function:
@@ -226,8 +226,8 @@ def _message_of(error: Exception) -> str:
 
 def position(mistake: str) -> tuple[str, int]:
     """Return the file and line of a mistake; a mistake without them comes first."""
-    found = PLACED.match(mistake)
-    file, _, number = found[0][:-2].rpartition(":") if found else ("", "", "0")
+    match = PLACED.match(mistake)
+    file, _, number = match[0][:-2].rpartition(":") if match else ("", "", "0")
     return file, int(number)
 
 
@@ -238,8 +238,10 @@ def _module(path: str) -> ast.Module:
 
 def _definition(path: str, line: int) -> ast.FunctionDef | None:
     """Return the function that begins at a line of a module."""
-    found = (n for n in _module(path).body if isinstance(n, ast.FunctionDef) and n.lineno == line)
-    return next(found, None)
+    functions = (
+        n for n in _module(path).body if isinstance(n, ast.FunctionDef) and n.lineno == line
+    )
+    return next(functions, None)
 
 
 @cache
@@ -268,15 +270,15 @@ def _is_included(function: FunctionType, path: str, module: str) -> bool:
 
 def _stored(*nodes: ast.AST) -> list[str]:
     """Return the names that nodes assign, not in nested functions and expressions with `for`."""
-    found: list[str] = []
+    names: list[str] = []
     for node in nodes:
         if isinstance(node, ast.FunctionDef):
-            found.append(node.name)
+            names.append(node.name)
         elif isinstance(node, ast.Name):
-            found += [node.id] if isinstance(node.ctx, ast.Store) else []
+            names += [node.id] if isinstance(node.ctx, ast.Store) else []
         elif not isinstance(node, ast.GeneratorExp):
-            found += _stored(*ast.iter_child_nodes(node))
-    return found
+            names += _stored(*ast.iter_child_nodes(node))
+    return names
 
 
 def _names(node: ast.AST) -> set[str]:
@@ -285,23 +287,23 @@ def _names(node: ast.AST) -> set[str]:
 
 def _free(*nodes: ast.AST) -> list[str]:
     """Return the names that nodes use and do not define themselves, in the order of use."""
-    found: list[str] = []
+    names: list[str] = []
     for node in nodes:
         if isinstance(node, ast.Name):
-            found += [node.id] if isinstance(node.ctx, ast.Load) else []
+            names += [node.id] if isinstance(node.ctx, ast.Load) else []
         elif isinstance(node, ast.FunctionDef):
             own = _own(node)
-            found += _free(*node.args.defaults, *filter(None, node.args.kw_defaults))
-            found += [name for name in _free(*node.body) if name not in own]
+            names += _free(*node.args.defaults, *filter(None, node.args.kw_defaults))
+            names += [name for name in _free(*node.body) if name not in own]
         elif isinstance(node, ast.GeneratorExp):
             generator, own = node.generators[0], _names(node.generators[0].target)
             inner = _free(node.elt, *generator.ifs)
-            found += [*_free(generator.iter), *(name for name in inner if name not in own)]
+            names += [*_free(generator.iter), *(name for name in inner if name not in own)]
         elif isinstance(node, ast.AnnAssign):
-            found += _free(*filter(None, [node.value]))
+            names += _free(*filter(None, [node.value]))
         else:
-            found += _free(*ast.iter_child_nodes(node))
-    return found
+            names += _free(*ast.iter_child_nodes(node))
+    return names
 
 
 def _arguments(node: ast.FunctionDef) -> list[ast.arg]:
@@ -320,15 +322,15 @@ def _is_none(node: ast.expr | None) -> bool:
 
 def _beyond_loops(*nodes: ast.AST) -> set[str]:
     """Return the names that occur outside of the loops that assign them."""
-    found: set[str] = set()
+    names: set[str] = set()
     for node in nodes:
         if isinstance(node, ast.For):
-            found |= {*_free(node.iter)} | _beyond_loops(*node.body) - _names(node.target)
+            names |= {*_free(node.iter)} | _beyond_loops(*node.body) - _names(node.target)
         elif isinstance(node, (ast.FunctionDef, ast.expr)):
-            found |= {*_free(node), *_stored(node)}
+            names |= {*_free(node), *_stored(node)}
         else:
-            found |= _beyond_loops(*ast.iter_child_nodes(node))
-    return found
+            names |= _beyond_loops(*ast.iter_child_nodes(node))
+    return names
 
 
 class _Loop(NamedTuple):
@@ -540,26 +542,26 @@ class _Builder:
     # Blocks
 
     def _block(self, nodes: Sequence[ast.stmt]) -> list[Statement]:
-        found: list[Statement] = []
+        statements: list[Statement] = []
         self._blocks += 1
         for node in nodes:
             if self.known is None:
                 break  # unreachable
-            before = len(found)
-            self._before = found
+            before = len(statements)
+            self._before = statements
             with _Noting(self, node):
-                self._statement(node, found)
+                self._statement(node, statements)
             self._before = None
             about = _comments(self.path).get(node.end_lineno or 0)
             is_simple = not isinstance(
                 node, (ast.If, ast.While, ast.For, ast.FunctionDef, ast.Match)
             )
-            if about and is_simple and len(found) > before:
-                found[-1].comment = about
+            if about and is_simple and len(statements) > before:
+                statements[-1].comment = about
         self._blocks -= 1
-        return found
+        return statements
 
-    def _statement(self, node: ast.stmt, found: list[Statement]) -> None:
+    def _statement(self, node: ast.stmt, statements: list[Statement]) -> None:
         name = f"_{type(node).__name__.lower()}_statement"
         is_branched = isinstance(node, (ast.If, ast.Match))
         if is_branched and self._blocks + len(getattr(node, "cases", ())) > _MOST_BLOCKS:
@@ -567,20 +569,20 @@ class _Builder:
             raise _Outside(node, what)
         if not hasattr(self, name):
             raise self._cannot(node, word_of(node))
-        getattr(self, name)(node, found)
+        getattr(self, name)(node, statements)
 
-    def _pass_statement(self, node: ast.Pass, found: list[Statement]) -> None:
+    def _pass_statement(self, node: ast.Pass, statements: list[Statement]) -> None:
         """Add no statement."""
 
-    def _expr_statement(self, node: ast.Expr, found: list[Statement]) -> None:
+    def _expr_statement(self, node: ast.Expr, statements: list[Statement]) -> None:
         if isinstance(getattr(node.value, "value", None), str):
             return  # as docstrings are
         if not isinstance(node.value, ast.Call):
             is_word = isinstance(node.value, (ast.Await, ast.Yield, ast.YieldFrom))
             raise self._cannot(node, word_of(node.value if is_word else node))
-        found.append(tree.Do(self.expression(node.value, NOTHING)))
+        statements.append(tree.Do(self.expression(node.value, NOTHING)))
 
-    def _return_statement(self, node: ast.Return, found: list[Statement]) -> None:
+    def _return_statement(self, node: ast.Return, statements: list[Statement]) -> None:
         assert self.node is not None
         name, value = self.node.name, None
         try:
@@ -593,18 +595,18 @@ class _Builder:
                 self._returns = self._returns or value.type
         finally:
             self.known = None
-        found.append(tree.Return(value))
+        statements.append(tree.Return(value))
 
-    def _break_statement(self, node: ast.Break, found: list[Statement]) -> None:
+    def _break_statement(self, node: ast.Break, statements: list[Statement]) -> None:
         self._ends[-1] = _both(self._ends[-1], self.known)
         self.known = None
-        found.append(tree.Break())
+        statements.append(tree.Break())
 
-    def _continue_statement(self, node: ast.Continue, found: list[Statement]) -> None:
+    def _continue_statement(self, node: ast.Continue, statements: list[Statement]) -> None:
         self.known = None
-        found.append(tree.Continue())
+        statements.append(tree.Continue())
 
-    def _if_statement(self, node: ast.If, found: list[Statement]) -> None:
+    def _if_statement(self, node: ast.If, statements: list[Statement]) -> None:
         test: Expression = Number(True, BOOL)
         with _Noting(self):
             test = self.condition(node.test)
@@ -613,18 +615,18 @@ class _Builder:
         after, self.known = self.known, before
         orelse = self._block(node.orelse)
         self.known = _both(after, self.known)
-        found.append(tree.If(test, body, orelse))
+        statements.append(tree.If(test, body, orelse))
 
-    def _assert_statement(self, node: ast.Assert, found: list[Statement]) -> None:
+    def _assert_statement(self, node: ast.Assert, statements: list[Statement]) -> None:
         test = Operation(tree.NOT, (self.condition(node.test),), BOOL)
         # The text is evaluated only if the condition does not hold.
         self._before = None
         parts: list[str | tuple[Expression, str]] = ["AssertionError: "]
         if node.msg is not None:
             parts += self._message(node.msg)
-        found.append(tree.If(test, [tree.Raise(parts)]))
+        statements.append(tree.If(test, [tree.Raise(parts)]))
 
-    def _match_statement(self, node: ast.Match, found: list[Statement]) -> None:
+    def _match_statement(self, node: ast.Match, statements: list[Statement]) -> None:
         subject = self._held(self.expression(node.subject), "case")
         if not is_whole(subject.type):
             raise _Outside(node, f"match of {subject.type.word}: it takes an int or an enumeration")
@@ -653,15 +655,15 @@ class _Builder:
         orelse: Sequence[Statement] = ()
         for test, body in reversed(tests):
             orelse = body if test is None else [tree.If(test, body, orelse)]
-        found += orelse
+        statements += orelse
 
     def _cases(self, pattern: ast.pattern) -> list[Expression]:
         """Return the values of a case; empty for the default case."""
         if isinstance(pattern, ast.MatchAs) and pattern.pattern is None and pattern.name is None:
             return []
         if isinstance(pattern, ast.MatchOr):
-            found = [self._cases(alternative) for alternative in pattern.patterns]
-            return [value for values in found for value in values] if all(found) else []
+            cases = [self._cases(alternative) for alternative in pattern.patterns]
+            return [value for values in cases for value in values] if all(cases) else []
         if isinstance(pattern, ast.MatchValue):
             value = self.expression(pattern.value)
             if is_whole(value.type):
@@ -672,7 +674,7 @@ class _Builder:
         tests = [Operation(tree.EQUAL, (subject, value), BOOL) for value in values]
         return tests[0] if len(tests) == 1 else Operation(tree.OR, tests, BOOL)
 
-    def _while_statement(self, node: ast.While, found: list[Statement]) -> None:
+    def _while_statement(self, node: ast.While, statements: list[Statement]) -> None:
         if node.orelse:
             raise self._cannot(node.orelse[0], "else of a while")
         is_endless = isinstance(node.test, ast.Constant) and node.test.value == 1
@@ -691,9 +693,9 @@ class _Builder:
         body = self._block(node.body)
         end = self._ends.pop()
         self.known = end if is_endless else before
-        found.append(tree.While(test, body))
+        statements.append(tree.While(test, body))
 
-    def _for_statement(self, node: ast.For, found: list[Statement]) -> None:
+    def _for_statement(self, node: ast.For, statements: list[Statement]) -> None:
         if node.orelse:
             raise self._cannot(node.orelse[0], "else of a for")
         self._check_target(node.target)
@@ -727,7 +729,7 @@ class _Builder:
             after = {name: inside[name] for name, _ in loop.bound if name in self._beyond_loops}
             self.known = {**before, **after}
             self.known = self.known if loop.turns else _both(before, self.known)
-        found.append(loop.made([*stores, *body]))
+        statements.append(loop.made([*stores, *body]))
 
     def _turn(
         self, node: ast.For | ast.comprehension, loop: _Loop, used: Set[str]
@@ -746,7 +748,7 @@ class _Builder:
 
     # Nested functions
 
-    def _functiondef_statement(self, node: ast.FunctionDef, found: list[Statement]) -> None:
+    def _functiondef_statement(self, node: ast.FunctionDef, statements: list[Statement]) -> None:
         if self._counts[node.name] > (node.name not in self.made.arguments):
             raise _Outside(node, f"{node.name} is given a value twice: use two names")
         own = _own(node)
@@ -780,11 +782,11 @@ class _Builder:
         self._check_functions(names)
         captured = {name: called.captured for name, called in self.functions.items()}
         used = [n for name in names for n in (name, *captured.get(name, ()))]
-        found = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
-        for name in found:
+        needed = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
+        for name in needed:
             if name in own:
                 raise _Outside(node, f"{name} has two meanings here: rename one")
-        return found
+        return needed
 
     def _check_functions(self, names: Sequence[str]) -> None:
         """Refuse local functions that may be undefined."""
@@ -809,31 +811,31 @@ class _Builder:
 
     # Assignments
 
-    def _assign_statement(self, node: ast.Assign, found: list[Statement]) -> None:
+    def _assign_statement(self, node: ast.Assign, statements: list[Statement]) -> None:
         for target in node.targets:
             self._check_target(target)
         value: ast.expr = node.value
         if len(node.targets) == 1:
-            self._assign(node.targets[0], value, found)
+            self._assign(node.targets[0], value, statements)
             return
         held = self._kept(self.expression(value), "all")
         for target in node.targets:
-            found += self._take_apart(target, held)
+            statements += self._take_apart(target, held)
 
-    def _annassign_statement(self, node: ast.AnnAssign, found: list[Statement]) -> None:
+    def _annassign_statement(self, node: ast.AnnAssign, statements: list[Statement]) -> None:
         self._check_target(node.target)
         assert isinstance(node.target, ast.Name)
         if node.value is None:
             raise self._cannot(node, word_of(node))
         type_ = self._hinted(node, node.annotation, node.target.id)
-        found.append(self._store(node, [(node.target.id, self.fitting(node.value, type_))]))
+        statements.append(self._store(node, [(node.target.id, self.fitting(node.value, type_))]))
 
-    def _augassign_statement(self, node: ast.AugAssign, found: list[Statement]) -> None:
+    def _augassign_statement(self, node: ast.AugAssign, statements: list[Statement]) -> None:
         self._check_target(node.target)
         assert isinstance(node.target, ast.Name)
         target = ast.copy_location(ast.Name(node.target.id, ast.Load()), node)
         changed = ast.copy_location(ast.BinOp(target, node.op, node.value), node)
-        found.append(self._store(node, [(target.id, self.expression(changed))]))
+        statements.append(self._store(node, [(target.id, self.expression(changed))]))
 
     def _check_target(self, node: ast.expr) -> None:
         if isinstance(node, (ast.Tuple, ast.List)):
@@ -850,14 +852,14 @@ class _Builder:
             what = f"{word_of(node)} of a matrix" if is_of_matrix else word_of(node)
             raise self._cannot(node, f"an assignment to {what}")
 
-    def _assign(self, target: ast.expr, value: ast.expr, found: list[Statement]) -> None:
+    def _assign(self, target: ast.expr, value: ast.expr, statements: list[Statement]) -> None:
         if isinstance(target, ast.Name) and target.id == "_":
-            found.append(tree.Do(self.expression(value)))
+            statements.append(tree.Do(self.expression(value)))
         elif isinstance(target, ast.Name) and (change := self._change_of(target, value)):
-            found.append(change)
+            statements.append(change)
         elif isinstance(target, ast.Name):
             wanted = (self.known or {}).get(target.id)
-            found.append(self._store(target, [(target.id, self.expression(value, wanted))]))
+            statements.append(self._store(target, [(target.id, self.expression(value, wanted))]))
         elif (
             isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
             and len(target.elts) == len(value.elts)
@@ -871,19 +873,19 @@ class _Builder:
                     for i, (_, element) in enumerate(pairs)
                 ]
                 for (element, _), held in zip(pairs, values):
-                    found += self._take_apart(element, held)
+                    statements += self._take_apart(element, held)
             elif all(isinstance(name, ast.Name) and name.id != "_" for name, _ in pairs):
                 made = [(ast.unparse(name), self.expression(element)) for name, element in pairs]
-                found.append(self._store(target, made))
+                statements.append(self._store(target, made))
             else:
                 for name, element in pairs:
-                    self._assign(name, element, found)
+                    self._assign(name, element, statements)
         else:
             made_of = self.expression(value)
             # Store the value if an assignment could change parts that are read later.
             if not _is_fixed(made_of) or _names(target) & _names(value):
                 made_of = self._kept(made_of, self._name_of_all(target, value))
-            found += self._take_apart(target, made_of)
+            statements += self._take_apart(target, made_of)
 
     def _change_of(self, target: ast.Name, value: ast.expr) -> Statement | None:
         """Return the change of an element if the assignment only replaces one: it needs no copy."""
@@ -976,9 +978,9 @@ class _Builder:
     def _unused(self, name: str) -> str:
         """Return a new name for the tree."""
         names = chain([name], (f"{name}_{number}" for number in count(2)))
-        found = next(n for n in names if n not in self._taken)
-        self._taken.add(found)
-        return found
+        free = next(n for n in names if n not in self._taken)
+        self._taken.add(free)
+        return free
 
     def _held(self, value: Expression, name: str) -> Expression:
         """Return a value that may be used several times: a variable, if it must be computed."""
@@ -988,15 +990,15 @@ class _Builder:
         """Store a value in a new variable."""
         if self._before is None:
             raise _Outside(ast.Pass(), "this is computed only in some cases: give it a name before")
-        found = self._unused(name)
-        self._before.append(tree.Store([(found, value)]))
-        return Local(found, value.type)
+        local = self._unused(name)
+        self._before.append(tree.Store([(local, value)]))
+        return Local(local, value.type)
 
     # Exceptions that a component raises
 
-    def _raise_statement(self, node: ast.Raise, found: list[Statement]) -> None:
+    def _raise_statement(self, node: ast.Raise, statements: list[Statement]) -> None:
         try:
-            found.append(self._raised(node, node.exc))
+            statements.append(self._raised(node, node.exc))
         finally:
             self.known = None
 
@@ -1023,13 +1025,13 @@ class _Builder:
             if not (isinstance(text, ast.Constant) and isinstance(text.value, str)):
                 raise self._cannot(text, "a raise without a text")
             text = ast.copy_location(ast.JoinedStr([text]), text)
-        found: list[Any] = []
+        parts: list[Any] = []
         for part in text.values:
             if isinstance(part, ast.FormattedValue):
-                found.append(self._formatted(part))
+                parts.append(self._formatted(part))
             else:
-                found.append(_text(ast.literal_eval(part)).value)
-        return found
+                parts.append(_text(ast.literal_eval(part)).value)
+        return parts
 
     def _formatted(self, part: ast.FormattedValue) -> tuple[Expression, str]:
         """Return a value in a message, and its format."""
@@ -1168,7 +1170,7 @@ class _Builder:
         if self._depth > _DEEPEST:
             raise _Outside(node, f"an expression of {_DEEPEST} levels: take it apart")
         try:
-            found: Expression = getattr(self, name)(node, wanted)
+            expression: Expression = getattr(self, name)(node, wanted)
         except (_Outside, _Follows) as error:
             if isinstance(error, _Outside) and not hasattr(error.node, "lineno"):
                 error.node = node
@@ -1177,11 +1179,11 @@ class _Builder:
             raise _Outside(node, _message_of(error)) from None
         finally:
             self._depth -= 1
-        if found.type == UNKNOWN:
+        if expression.type == UNKNOWN:
             raise _Follows
-        if found.type == NOTHING != wanted:
+        if expression.type == NOTHING != wanted:
             raise _Outside(node, "what returns nothing is used as a value")
-        return found
+        return expression
 
     def fitting(self, node: ast.expr, wanted: Type | None) -> Expression:
         """Return an expression of exactly this type."""
@@ -1271,8 +1273,8 @@ class _Builder:
             isinstance(node, ast.Call) and self._global_value(node.func) is len
             and not any(isinstance(part, ast.Call) for x in node.args for part in ast.walk(x))
         ):  # fmt: skip
-            found = self.expression(node)
-            return int(found.value) if isinstance(found, Number) else None
+            size = self.expression(node)
+            return int(size.value) if isinstance(size, Number) else None
         value = node.value if isinstance(node, ast.Constant) else self._global_value(node)
         return value if type(value) in (int, float) else None  # type: ignore[return-value]
 
@@ -1680,10 +1682,10 @@ class _Builder:
             ]
         elif any(value.type != values[0].type for value in values):
             values = [*map(_as_int, values)]
-        found = values[0]
+        extreme = values[0]
         for value in values[1:]:
-            found = arrays.extreme_of_two(word, found, value)
-        return found
+            extreme = arrays.extreme_of_two(word, extreme, value)
+        return extreme
 
     def _of_generator(self, node: ast.Call, word: str) -> Expression:
         self._check_plain(node, word, 1)
@@ -2063,8 +2065,8 @@ def _first_name(target: ast.expr) -> str:
 
 def _stem(name: str) -> str:
     """Return a name without leading underscores; empty if nothing remains."""
-    found = name.lstrip("_")
-    return found if found.isidentifier() else ""
+    bare = name.lstrip("_")
+    return bare if bare.isidentifier() else ""
 
 
 def _value(expression: Expression) -> int | None:
@@ -2074,10 +2076,10 @@ def _value(expression: Expression) -> int | None:
 
 def _count(first: int, place: Expression, step: int) -> Expression:
     """Return the number of a range at an index."""
-    found = place
+    offset = place
     if step != 1:
-        found = Operation(tree.COUNT_MULTIPLY, (place, int_of(step)), INT)
-    return Operation(tree.COUNT_ADD, (int_of(first), found), INT) if first else found
+        offset = Operation(tree.COUNT_MULTIPLY, (place, int_of(step)), INT)
+    return Operation(tree.COUNT_ADD, (int_of(first), offset), INT) if first else offset
 
 
 def _is_fixed(value: Expression) -> bool:

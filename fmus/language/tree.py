@@ -392,13 +392,13 @@ def stored_in(statement: Statement) -> list[str]:
 
 def variables_in(body: Sequence[Statement]) -> dict[str, Type]:
     """Return the variables that a block assigns, with their types."""
-    found: dict[str, Type] = {}
+    types: dict[str, Type] = {}
     for statement in statements_in(body):
         if isinstance(statement, Store):
-            found |= {name: value.type for name, value in statement.values}
+            types |= {name: value.type for name, value in statement.values}
         elif isinstance(statement, Reserve):
-            found[statement.name] = statement.type
-    return found
+            types[statement.name] = statement.type
+    return types
 
 
 def may_fail(statement: Statement) -> bool:

@@ -82,7 +82,7 @@ _BREAK = "\x02"
 def quoted(text: str) -> str:
     """Return a string literal of C."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    escaped = re.sub(r"[\x00-\x1f\x7f]", lambda found: f"\\{ord(found[0]):03o}", escaped)
+    escaped = re.sub(r"[\x00-\x1f\x7f]", lambda match: f"\\{ord(match[0]):03o}", escaped)
     # Two question marks may begin a trigraph.
     escaped = escaped.replace("?", "\\?") if "??" in escaped else escaped
     return f'"{escaped}"'
@@ -103,8 +103,8 @@ def lines_of(text: str, indent: str) -> list[str]:
         else:
             lines.append(begin + item)
         begin = indent + INDENT
-    found = [part for line in lines for part in _wrapped(line, begin)]
-    return [line.replace(_KEPT, " ") for line in found]
+    wrapped = [part for line in lines for part in _wrapped(line, begin)]
+    return [line.replace(_KEPT, " ") for line in wrapped]
 
 
 def _wrapped(line: str, indent: str) -> list[str]:
@@ -246,8 +246,8 @@ class Emitter:
         """Return a name for a function or constant of a module."""
         stems = (part.lstrip("_") for part in (module.rpartition(".")[2], name))
         parts = [*stems, *map(self.type, sizes)]
-        found = re.sub(r"\W+", "_", "_".join(filter(None, parts)))
-        return self.unused(found if found.isidentifier() else f"of_{found}")
+        word = re.sub(r"\W+", "_", "_".join(filter(None, parts)))
+        return self.unused(word if word.isidentifier() else f"of_{word}")
 
     # Types and constants
 
@@ -492,10 +492,10 @@ class _Definition:
             new = here.get(i, [])
             if not isinstance(statement, (tree.Store, tree.Reserve)):
                 lines += [f"{indent}{self._zero(name, types[name])}" for name in new]
-            found = [*self._statement(statement, new, stores, known, indent)]
-            if statement.comment and found:
-                found = _annotated(found, f"/* {closed(statement.comment)} */", indent)
-            lines += found
+            texts = [*self._statement(statement, new, stores, known, indent)]
+            if statement.comment and texts:
+                texts = _annotated(texts, f"/* {closed(statement.comment)} */", indent)
+            lines += texts
         return lines
 
     def _zero(self, name: str, type_: Type) -> str:
@@ -666,11 +666,11 @@ def _ends(body: Sequence[Statement]) -> bool:
 
 def _chain(branch: tree.If) -> tuple[list[tree.If], Sequence[Statement]]:
     """Return an if with its chain of elifs, and the block of the final else."""
-    found, orelse = [branch], branch.orelse
+    branches, orelse = [branch], branch.orelse
     while len(orelse) == 1 and isinstance(orelse[0], tree.If) and not orelse[0].comment:
-        found.append(orelse[0])
+        branches.append(orelse[0])
         orelse = orelse[0].orelse
-    return found, orelse
+    return branches, orelse
 
 
 def _used(statement: Statement, deep: bool = True) -> Iterator[str]:
@@ -721,5 +721,5 @@ def _comments(made: Any) -> dict[str, str]:
         text = inspect.getsource(made)
     except OSError:
         return {}  # made without a class statement
-    found = re.findall(r"^    (\w+):.*#: (.*)$", text, re.MULTILINE)
-    return {name: f" /* {strip_sphinx_marks(text)} */" for name, text in found}
+    comments = re.findall(r"^    (\w+):.*#: (.*)$", text, re.MULTILINE)
+    return {name: f" /* {strip_sphinx_marks(text)} */" for name, text in comments}

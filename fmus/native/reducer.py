@@ -44,7 +44,7 @@ class ReducerText:
 
     def text(self) -> Iterator[str]:
         """Yield the functions that process a row and return the numbers."""
-        row, found = self._type(self.reducer.inputs), self._type(self.reducer.outputs)
+        row, outputs = self._type(self.reducer.inputs), self._type(self.reducer.outputs)
         start, update = self._call("start"), self._call("update", state="it->state")
         lines = [
             "if (it->begun < 0) return;",
@@ -74,7 +74,7 @@ class ReducerText:
         lines = [
             f"for (int i = 0; i < {len(results)}; i++) found[i] = NAN;",
             "if (it->begun < 1) return;",
-            f"const {found} all = {self._call('outputs', state='it->state')};",
+            f"const {outputs} all = {self._call('outputs', state='it->state')};",
             *(f"found[{i}] = {text};" for i, text in enumerate(numbers)),
         ]
         yield "/* Returns the numbers, which are NaN before the first row. */\n" + function(

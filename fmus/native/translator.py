@@ -187,16 +187,16 @@ def _glue(emitter: Emitter, program: Program, behaviour: Behaviour) -> str:
 
 def _constants(behaviour: Behaviour) -> str:
     """Write the constants that follow from the hooks."""
-    found = {
+    numbers = {
         "DRAWS": behaviour.draws,
         "SAMPLED": behaviour.is_sampled,
         "HAS_GUARD": behaviour.hooks["credible"] is not None,
         **{name: behaviour.takes(*question) for name, question in _TAKES.items()},
     }
-    return constants(found, _directives(behaviour.restarted))
+    return constants(numbers, _directives(behaviour.restarted))
 
 
-def constants(found: Mapping[str, int], restarted: str = "") -> str:
+def constants(numbers: Mapping[str, int], restarted: str = "") -> str:
     """Write the constants for the runtime.
 
     Args:
@@ -204,7 +204,7 @@ def constants(found: Mapping[str, int], restarted: str = "") -> str:
         restarted: message when a state is replaced, in the format of `compose`.
 
     """
-    rows = "".join(f"    MODEL_{name} = {int(found.get(name, 0))},\n" for name in _ASKED)
+    rows = "".join(f"    MODEL_{name} = {int(numbers.get(name, 0))},\n" for name in _ASKED)
     return f"enum {{\n{rows}}};\n#define MODEL_RESTARTED {quoted(restarted)}"
 
 
@@ -331,12 +331,12 @@ def deepest(
     """
     depths: dict[Function, int] = {}
     for called in functions:
-        found = [
+        expressions = [
             expression
             for statement in tree.statements_in(called.body)
             for expression in tree.expressions_of(statement)
         ]
-        own = sum(map(_held, found))
+        own = sum(map(_held, expressions))
         named = chain(called.arguments.items(), tree.variables_in(called.body).items())
         own += sum(_result(type_) for name, type_ in named if name not in shared(called))
         deeper = max((depths[call.function] for call in tree.calls_in(called.body)), default=0)

@@ -57,8 +57,8 @@ class Model:
     @property
     def identifier(self) -> str:
         """The name of its library, which is valid in C."""
-        found = re.sub(r"\W", "_", self.name, flags=re.ASCII)
-        return found if found[:1].isalpha() else f"of_{found}"
+        name = re.sub(r"\W", "_", self.name, flags=re.ASCII)
+        return name if name[:1].isalpha() else f"of_{name}"
 
     @property
     def about(self) -> dict[str, str]:
@@ -136,7 +136,7 @@ def _fed_through(
 ) -> Iterator[Port]:
     """Yield the outputs, with dependencies on ports in place of fields of the inputs."""
     names = {field: [port.name for port in ports] for field, ports in inputs.items()}
-    names |= {name: [name] for found in [*names.values()] for name in found}
+    names |= {name: [name] for own in [*names.values()] for name in own}
     names[TIME.name] = [TIME.name]
     for field, ports in outputs.items():
         for port in ports:

@@ -330,8 +330,8 @@ def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]
     names = {port.name: port.array.name if port.array else port.name for port in ports}
     keyed = [(names[port.name], place, port) for place, port in enumerate(ports, start=1)]
     variables = []
-    for name, found in groupby(keyed, itemgetter(0)):
-        members = [*found]
+    for name, group in groupby(keyed, itemgetter(0)):
+        members = [*group]
         _, reference, first = members[0]
         elements = [port for _, _, port in members]
         described = first.array.description if first.array else first.description
@@ -349,9 +349,9 @@ def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]
     return variables
 
 
-def _names(names: Mapping[str, str], found: Iterable[str]) -> dict[str, None]:
+def _names(names: Mapping[str, str], scalars: Iterable[str]) -> dict[str, None]:
     """Return the names of variables for names of scalars, each once."""
-    return dict.fromkeys(names.get(name, name) for name in found)
+    return dict.fromkeys(names.get(name, name) for name in scalars)
 
 
 def _variables(variables: Sequence[_Variable]) -> Element:

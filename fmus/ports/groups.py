@@ -31,14 +31,14 @@ class Nothing(NamedTuple):
 
 def slices(ports: Sequence[Port]) -> dict[str, slice]:
     """Return the slice of each group of neighbouring ports among their values."""
-    found: dict[str, slice] = {}
+    slices: dict[str, slice] = {}
     start = 0
     for group, members in groupby(ports, lambda port: group_name(port.name)):
-        if group in found:
+        if group in slices:
             raise TypeError(f"the ports of {group} are not neighbours")
-        found[group] = slice(start, start + len(list(members)))
-        start = found[group].stop
-    return found
+        slices[group] = slice(start, start + len(list(members)))
+        start = slices[group].stop
+    return slices
 
 
 def hints_of(owner: Any) -> dict[str, Any]:

@@ -125,11 +125,11 @@ def unit_of(text: str) -> Unit:
         return Unit(name)  # a / b.c is ambiguous
     for factors, sign in ((product, 1), *((divisor, -1) for divisor in divisors)):
         for part in factors.split("."):
-            found = _FACTOR.fullmatch(part)
-            known = _symbol(found[1]) if found else None
-            if found is None or known is None:
+            match = _FACTOR.fullmatch(part)
+            known = _symbol(match[1]) if match else None
+            if match is None or known is None:
                 return Unit(name)
-            power = sign * int(found[2] or 1)
+            power = sign * int(match[2] or 1)
             factor *= known[0] ** power
             for base, exponent in known[1].items():
                 exponents[base] = exponents.get(base, 0) + power * exponent

@@ -318,7 +318,7 @@ def text_of(seed: int) -> str:
     module, function = draw.choice(HELPERS)
     text = Component(seed).text().replace("HELPER", module).replace("white_noise", function)
     if seed % 2:
-        places = [(found.span(), "") for found in _TYPE.finditer(text, text.index("class Draws"))]
+        places = [(match.span(), "") for match in _TYPE.finditer(text, text.index("class Draws"))]
         if seed % 4 == 3:
             places = [
                 (m.span(), new) for old, new in MISTAKES for m in re.finditer(re.escape(old), text)

@@ -63,7 +63,7 @@ def bare_root(folder: Path, *binaries: Path) -> list[str]:
     command = [chroot] if os.geteuid() == 0 else [unshare, "-r", chroot]
     if subprocess.run([*command, "/", "true"], capture_output=True, check=False).returncode != 0:
         pytest.skip("the root folder may not be changed here")
-    needed = {found for binary in binaries for found in libraries_of(binary)}
+    needed = {library for binary in binaries for library in libraries_of(binary)}
     for path in needed | {binary for binary in binaries if folder not in binary.parents}:
         target = folder / path.relative_to("/")
         target.parent.mkdir(parents=True, exist_ok=True)

@@ -145,7 +145,7 @@ OF_SINES = ("final_error",)
 
 
 def compare_indices(
-    run: Prepared, table: Table, found: np.ndarray, outcome: Any, near: Sequence[str]
+    run: Prepared, table: Table, computed: np.ndarray, outcome: Any, near: Sequence[str]
 ):
     """Compare the indices of rows in Node with those that the master has of the same rows.
 
@@ -158,7 +158,7 @@ def compare_indices(
 
     """
     rows = table.rows.copy()
-    rows[:, places(table)] = found
+    rows[:, places(table)] = computed
     metrics = metrics_of(Table.of(table.header, rows), run.loops)
     together = {name: [value] for name, value in metrics.together.items()}
     assert len(together) == (len(run.loops) > 1)

@@ -30,8 +30,8 @@ def users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def contents(found: dict[Path, bytes]) -> dict[str, bytes]:
-    return {path.name: content for path, content in found.items()}
+def contents(files: dict[Path, bytes]) -> dict[str, bytes]:
+    return {path.name: content for path, content in files.items()}
 
 
 def is_refused(users: Path, culprit: Path) -> None:

@@ -261,7 +261,7 @@ MACHINES = {
 
 @pytest.mark.parametrize("fmi", FOLDERS)
 def test_all_platforms_have_the_names_of_the_standard(fmi: str):
-    assert {found.name: found.ending for found in platforms(fmi, "all")} == FOLDERS[fmi]
+    assert {platform.name: platform.ending for platform in platforms(fmi, "all")} == FOLDERS[fmi]
 
 
 @pytest.mark.parametrize("machine", MACHINES, ids=" ".join)
@@ -271,8 +271,8 @@ def test_default_platform_is_this_machine(fmi, machine, monkeypatch: pytest.Monk
     monkeypatch.setattr(platform, "system", lambda: machine[1])
     names = MACHINES[machine][list(FOLDERS).index(fmi)]
     if names:
-        assert [found.name for found in platforms(fmi)] == names
-        assert all(this_machine() in found.machines for found in platforms(fmi))
+        assert [platform.name for platform in platforms(fmi)] == names
+        assert all(this_machine() in platform.machines for platform in platforms(fmi))
     else:
         with pytest.raises(ValueError, match=f"no platform for this machine, {machine[0]}-"):
             platforms(fmi)
@@ -280,7 +280,7 @@ def test_default_platform_is_this_machine(fmi, machine, monkeypatch: pytest.Monk
 
 def test_names_may_be_given_in_any_order_and_twice():
     wanted = platforms("2", "win64, linux64,win64")
-    assert [found.name for found in wanted] == ["linux64", "win64"]
+    assert [platform.name for platform in wanted] == ["linux64", "win64"]
 
 
 def test_library_of_macos_is_for_both_of_its_processors():
