@@ -44,7 +44,9 @@ _MANY = (100, 1_000, 10_000, 100_000)
 def engines(names: Sequence[str]) -> tuple[FmuEngine, BatchEngine]:
     """Both engines for some scenarios."""
     ready = {name: prepare(*load_scenario(name, NATIVE), Request(kind=NATIVE)) for name in names}
-    return FmuEngine(ready), BatchEngine({name: one.system for name, one in ready.items()})
+    return FmuEngine(ready), BatchEngine(
+        {name: prepared.system for name, prepared in ready.items()}
+    )
 
 
 def processor(function: Callable[[], object]) -> float:
@@ -91,11 +93,11 @@ def check(n: int) -> None:
     for name in ready_studies():
         study = read_study(name)
         fmus, batch = engines(study.scenario)
-        space = Space(study, {one: load_scenario(one, NATIVE) for one in study.scenario})
+        space = Space(study, {name: load_scenario(name, NATIVE) for name in study.scenario})
         points = [space[number] for number in Random(name).sample(range(len(space)), n)]
         same = sum(
-            bool(expected.failure) if found.failure == REFUSED else found == expected
-            for found, expected in zip(batch.outcomes(points), fmus.outcomes(points), strict=True)
+            bool(expected.failure) if outcome.failure == REFUSED else outcome == expected
+            for outcome, expected in zip(batch.outcomes(points), fmus.outcomes(points), strict=True)
         )
         print(f"{name:12} {same} of {n} runs are the same", flush=True)
 

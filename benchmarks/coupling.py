@@ -50,7 +50,7 @@ def _ring(folder: Path, gain: float) -> System:
 
 
 def _print(name: str, errors: list[float], least: float) -> None:
-    print(f"{name:34}" + "".join(f"{one:10.1e}" for one in errors) + f"{least:10.1f}")
+    print(f"{name:34}" + "".join(f"{error:10.1e}" for error in errors) + f"{least:10.1f}")
 
 
 def main() -> None:
@@ -72,8 +72,8 @@ def main() -> None:
                         for h in steps
                     ]
                     least = min(_time(system, finest, coupling) for _ in range(_ROUNDS))
-                    said = "nothing said" if says == "nothing" else "dependencies said"
-                    _print(f"  {coupling or 'held inputs'}, {said}", errors, least)
+                    declared = "nothing said" if says == "nothing" else "dependencies said"
+                    _print(f"  {coupling or 'held inputs'}, {declared}", errors, least)
         steps = [0.1, 0.05, 0.025]
         print(
             f"{'ring of gains':34}" + "".join(f"{1e3 * h:7.4g} ms" for h in steps) + "  us a step"

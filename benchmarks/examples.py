@@ -65,7 +65,7 @@ class Instance:
     def __init__(self, fmu: Path, folder: Path, loops: ctypes.CDLL) -> None:
         unpacked = fmpy.extract(fmu, unzipdir=folder)
         self.description = fmpy.read_model_description(unpacked)
-        self.variables = {one.name: one for one in self.description.modelVariables}
+        self.variables = {variable.name: variable for variable in self.description.modelVariables}
         self.version = self.description.fmiVersion[0]
         self._slave = instantiate_fmu(unpacked, self.description, "CoSimulation")
         self._loop = loops[f"fmi{self.version}_steps"]
@@ -75,15 +75,21 @@ class Instance:
     @property
     def outputs(self) -> list[str]:
         """Names of the outputs that are numbers."""
-        outputs = (one for one in self.variables.values() if one.causality == "output")
-        numbers = (one for one in outputs if one.type in ("Real", "Integer", "Float64", "Int32"))
+        outputs = (
+            variable for variable in self.variables.values() if variable.causality == "output"
+        )
+        numbers = (
+            variable
+            for variable in outputs
+            if variable.type in ("Real", "Integer", "Float64", "Int32")
+        )
         return [
             name
-            for one in numbers
+            for variable in numbers
             for name in (
-                [f"{one.name}[{i + 1}]" for i in range(ARRAYS[one.name])]
-                if one.dimensions
-                else [one.name]
+                [f"{variable.name}[{i + 1}]" for i in range(ARRAYS[variable.name])]
+                if variable.dimensions
+                else [variable.name]
             )
         ]
 
@@ -95,8 +101,8 @@ class Instance:
             slave.setupExperiment()
         for name, value in values.items():
             if name in self.variables:
-                one = self.variables[name]
-                getattr(slave, f"set{one.type}")([one.valueReference], [value])
+                variable = self.variables[name]
+                getattr(slave, f"set{variable.type}")([variable.valueReference], [value])
         slave.enterInitializationMode()
         slave.exitInitializationMode()
 
@@ -120,11 +126,11 @@ class Instance:
     def number(self, name: str) -> float:
         """Value of an output."""
         array, _, place = name.rstrip("]").partition("[")
-        one = self.variables.get(name) or self.variables[array]
-        get = getattr(self._slave, f"get{one.type}")
-        if one.dimensions:
-            return float(get([one.valueReference], nValues=ARRAYS[array])[int(place) - 1])
-        return float(get([one.valueReference])[0])
+        variable = self.variables.get(name) or self.variables[array]
+        get = getattr(self._slave, f"get{variable.type}")
+        if variable.dimensions:
+            return float(get([variable.valueReference], nValues=ARRAYS[array])[int(place) - 1])
+        return float(get([variable.valueReference])[0])
 
 
 class Row(NamedTuple):
@@ -143,35 +149,35 @@ class Row(NamedTuple):
 
     def begin(self, name: str) -> Instance:
         """Initialise an instance, and return it."""
-        one = self.instances[name]
-        one.begin({"h_max": self.h, **self.values[name]})
-        return one
+        instance = self.instances[name]
+        instance.begin({"h_max": self.h, **self.values[name]})
+        return instance
 
     def check(self, steps: int, tolerance: float) -> None:
         """Exit if the outputs of the instances do not change by the same numbers."""
         changes = {}
-        for name, one in self.instances.items():
+        for name, instance in self.instances.items():
             # A plain slave has its outputs only after a step.
             self.begin(name).steps(self.h, 1)
-            before = {output: one.number(output) for output in one.outputs}
+            before = {output: instance.number(output) for output in instance.outputs}
             self.begin(name).steps(self.h, steps)
-            changes[name] = {output: one.number(output) - x for output, x in before.items()}
+            changes[name] = {output: instance.number(output) - x for output, x in before.items()}
         expected, *others = changes.values()
-        for found in others:
-            common = expected.keys() & found.keys()
+        for other in others:
+            common = expected.keys() & other.keys()
             close = partial(isclose, rel_tol=tolerance, abs_tol=tolerance)
-            if not common or not all(close(expected[y], found[y]) for y in common):
+            if not common or not all(close(expected[y], other[y]) for y in common):
                 raise SystemExit(f"not the same numbers: {changes}")
 
     def times(self, steps: int, repetitions: int, runs: int = 1) -> dict[str, list[float]]:
         """Microseconds of a step in each turn, in which native FMUs make some runs."""
-        found: dict[str, list[float]] = {name: [] for name in self.instances}
+        times: dict[str, list[float]] = {name: [] for name in self.instances}
         for _ in range(repetitions):
             for name in self.instances:
                 n = runs if name == "native" else 1
                 seconds = sum(self.begin(name).steps(self.h, steps) for _ in range(n))
-                found[name].append(1e6 * seconds / n / steps)
-        return found
+                times[name].append(1e6 * seconds / n / steps)
+        return times
 
 
 def loops(folder: Path) -> ctypes.CDLL:
@@ -191,7 +197,7 @@ def ratio(times: Mapping[str, Sequence[float]], slow: str, fast: str) -> float:
 def rows(folder: Path, names: Sequence[str], calls: ctypes.CDLL) -> Iterator[tuple[str, Row]]:
     """Both kinds of each example, and its plain slave if there is one."""
     for name in names:
-        found = {
+        instances = {
             called: Instance(build(name, kind, "2", folder / called), folder / called / name, calls)
             for called, kind in (("native", "native"), ("Python", "python"))
         }
@@ -200,10 +206,10 @@ def rows(folder: Path, names: Sequence[str], calls: ctypes.CDLL) -> Iterator[tup
             plain = folder / "plain"
             plain.mkdir(exist_ok=True)
             fmu = Path(FmuBuilder.build_FMU(script, dest=plain))
-            found["plain"] = Instance(fmu, plain / name, calls)
-        declared = found["native"].description.defaultExperiment.stepSize
+            instances["plain"] = Instance(fmu, plain / name, calls)
+        declared = instances["native"].description.defaultExperiment.stepSize
         h = SOLVER_STEPS.get(name, float(declared))
-        yield name, Row(h, found, dict.fromkeys(found, OURS.get(name, {})))
+        yield name, Row(h, instances, dict.fromkeys(instances, OURS.get(name, {})))
 
 
 def references(folder: Path, given: Path, calls: ctypes.CDLL) -> Iterator[tuple[str, Row]]:

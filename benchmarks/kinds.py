@@ -87,7 +87,7 @@ def in_another(system: System, host: str, is_read: bool, steps: int) -> float:
 
 def engines(python: System, native: System) -> dict[str, Engine]:
     """All measurements that can run here."""
-    found: dict[str, Engine] = {
+    engines: dict[str, Engine] = {
         STRAIGHT: straight_line,
         PYTHON: partial(in_our_master, python, "python", "gauss-seidel"),
         NATIVE: partial(in_our_master, native, "python", "gauss-seidel"),
@@ -97,9 +97,9 @@ def engines(python: System, native: System) -> dict[str, Engine]:
     for name, host in OTHERS.items():
         if find_spec(HOSTS[host].package) is not None:
             for kind, system in (("Python", python), ("native", native)):
-                found[f"{name}, {kind} kind"] = partial(in_another, system, host, False)
-                found[f"{name}, {kind} kind, read"] = partial(in_another, system, host, True)
-    return found
+                engines[f"{name}, {kind} kind"] = partial(in_another, system, host, False)
+                engines[f"{name}, {kind} kind, read"] = partial(in_another, system, host, True)
+    return engines
 
 
 def instance_time(fmu: Path, folder: Path) -> float:

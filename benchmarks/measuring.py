@@ -91,8 +91,8 @@ def found_apart(script: str, *arguments: object, limit: float) -> Any:
     for line in process.stdout.decode(errors="replace").splitlines():
         if line.startswith(ONE):
             return json.loads(line.removeprefix(ONE))
-    said = process.stderr.decode(errors="replace").strip().splitlines()
-    why = said[-1][:80] if said else "without a word"
+    complaints = process.stderr.decode(errors="replace").strip().splitlines()
+    why = complaints[-1][:80] if complaints else "without a word"
     raise RuntimeError(f"failed ({process.returncode}): {why}")
 
 

@@ -317,18 +317,18 @@ def run(fmu: Path) -> None:
         made = ModelExchange if exchange else CoSimulation
 
         def instance() -> tuple[CoSimulation | ModelExchange, float]:
-            one = made(fmu, folder)
+            loaded = made(fmu, folder)
             start = perf_counter()
-            one.begin()
-            return one, perf_counter() - start
+            loaded.begin()
+            return loaded, perf_counter() - start
 
         first, first_seconds = instance()
         say(first=1e3 * first_seconds)
         seconds = []
         for _ in range(INSTANCES):
-            one, taken = instance()
+            loaded, taken = instance()
             seconds.append(taken)
-            one.end()
+            loaded.end()
         say(further=1e3 * min(seconds))
         say(step=1e6 * min(a_step(first) for _ in range(REPETITIONS)))
         bad, _ = instance()
@@ -348,28 +348,28 @@ def say(**found: object) -> None:
 
 def empty_calls() -> float:
     """Seconds of three empty calls through ctypes."""
-    compare, one, size = ctypes.CDLL(None).memcmp, (ctypes.c_double * 1)(), ctypes.c_size_t(0)
+    compare, number, size = ctypes.CDLL(None).memcmp, (ctypes.c_double * 1)(), ctypes.c_size_t(0)
     start = perf_counter()
     for _ in range(STEPS):
-        compare(one, one, size), compare(one, one, size), compare(one, one, size)
+        compare(number, number, size), compare(number, number, size), compare(number, number, size)
     return (perf_counter() - start) / STEPS
 
 
 _steps = count()
 
 
-def a_step(one: CoSimulation | ModelExchange) -> float:
+def a_step(instance: CoSimulation | ModelExchange) -> float:
     """Seconds of a step."""
     start = perf_counter()
     for _ in range(STEPS):
         k = next(_steps)
-        one.step(k, math.sin(0.1 * k))
+        instance.step(k, math.sin(0.1 * k))
     return (perf_counter() - start) / STEPS
 
 
-def state(one: CoSimulation, other: CoSimulation) -> str:
+def state(instance: CoSimulation, other: CoSimulation) -> str:
     """True if a run continues from a saved state with the same numbers."""
-    if not one.offers_state:
+    if not instance.offers_state:
         return "not offered"
 
     def rows(fmu: CoSimulation, first: int) -> list[list[float]]:
@@ -380,22 +380,22 @@ def state(one: CoSimulation, other: CoSimulation) -> str:
         return rows
 
     first = next(_steps)
-    rows(one, first)
-    saved = one.save()
-    expected = rows(one, first + BEFORE)
-    one.restore(saved)
-    here = rows(one, first + BEFORE) == expected
+    rows(instance, first)
+    saved = instance.save()
+    expected = rows(instance, first + BEFORE)
+    instance.restore(saved)
+    here = rows(instance, first + BEFORE) == expected
     other.restore(saved)
     there = rows(other, first + BEFORE) == expected
     return f"{'exact' if here else 'wrong'}, in another instance {'exact' if there else 'wrong'}"
 
 
-def after_nan(one: CoSimulation | ModelExchange) -> str:
+def after_nan(instance: CoSimulation | ModelExchange) -> str:
     """Effect of a thrust that is NaN."""
-    one.step(0, 1.0)
-    status = one.step(1, math.nan)
-    one.step(2, 1.0)
-    finite = all(map(math.isfinite, one.values))
+    instance.step(0, 1.0)
+    status = instance.step(1, math.nan)
+    instance.step(2, 1.0)
+    finite = all(map(math.isfinite, instance.values))
     refused = "accepted" if status == fmi2OK else f"refused with status {status}"
     return f"{refused}; after a good one outputs are {'finite' if finite else 'NaN'}"
 
@@ -430,9 +430,11 @@ def needed(library: str) -> list[str]:
         check=True,
         timeout=60,
     )
-    found = [line.split("[")[1][:-1] for line in dynamic.stdout.splitlines() if "(NEEDED)" in line]
-    found = [name for name in found if not name.startswith("ld-")]
-    return [*found, "Python's symbols"] if " Py_" in symbols.stdout else found
+    libraries = [
+        line.split("[")[1][:-1] for line in dynamic.stdout.splitlines() if "(NEEDED)" in line
+    ]
+    libraries = [name for name in libraries if not name.startswith("ld-")]
+    return [*libraries, "Python's symbols"] if " Py_" in symbols.stdout else libraries
 
 
 def problems(fmu: Path) -> int:
@@ -473,7 +475,7 @@ def measured(fmu: Path) -> dict[str, object]:
         os.killpg(process.pid, SIGKILL)
     process.wait()
     with os.fdopen(reading, encoding="utf-8") as lines:
-        found = {k: v for line in lines for k, v in json.loads(line).items()}
+        values = {k: v for line in lines for k, v in json.loads(line).items()}
     labels = {
         "first": "first instance [ms]",
         "further": "further instances [ms]",
@@ -482,7 +484,7 @@ def measured(fmu: Path) -> dict[str, object]:
         "nan": "NaN as input",
     }
     return {
-        **{labels[k]: round(v, 3) if isinstance(v, float) else v for k, v in found.items()},
+        **{labels[k]: round(v, 3) if isinstance(v, float) else v for k, v in values.items()},
         "the process ended with": ended,
     }
 
@@ -504,20 +506,23 @@ def main() -> None:
             print(f"\n{name} ({version(package)})", flush=True)
         except PackageNotFoundError:
             print(f"\n{name}")
-        with TemporaryDirectory(prefix="others") as one, TemporaryDirectory(prefix="others") as two:
+        with (
+            TemporaryDirectory(prefix="others") as folder,
+            TemporaryDirectory(prefix="others") as other,
+        ):
             try:
-                fmu = build(Path(one))
+                fmu = build(Path(folder))
             except (OSError, RuntimeError, subprocess.SubprocessError) as error:
                 print(f"    cannot be built: {error}")
                 continue
             sleep(APART)
-            found = {
+            results = {
                 **inside(fmu),
                 "validate_fmu [problems]": problems(fmu),
-                "built twice": differences(fmu, build(Path(two))),
+                "built twice": differences(fmu, build(Path(other))),
                 **measured(fmu),
             }
-        for label, value in found.items():
+        for label, value in results.items():
             print(f"    {label:24} {value}", flush=True)
 
 

@@ -181,8 +181,8 @@ def in_libcosim(folder: Path) -> tuple[float, float, float]:
     first = perf_counter()
     if not execution.step(STEPS - 1):
         raise SystemExit("libcosim ended the run")
-    one = (perf_counter() - first) / (STEPS - 1)
-    return read - begun, first - read - one, STEPS * one
+    a_step = (perf_counter() - first) / (STEPS - 1)
+    return read - begun, first - read - a_step, STEPS * a_step
 
 
 def in_ecos(folder: Path) -> tuple[float, float, float]:

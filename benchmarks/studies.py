@@ -158,12 +158,12 @@ def main() -> None:
             [cost(engine, islice(space, n), workers) for workers in (1, 2)]
             for _ in range(options.repetitions)
         ]
-        one, two = (min(pair[i].processor for pair in pairs) for i in (0, 1))
+        alone, paired = (min(pair[i].processor for pair in pairs) for i in (0, 1))
         gain = max(pair[0].wall / pair[1].wall for pair in pairs)
-        costs[name] = one
+        costs[name] = alone
         print(
-            f"{name:15}{1e3 * one:9.3f} ms of processor time a run by one worker,"
-            f"{1e3 * two:9.3f} ms by each of two"
+            f"{name:15}{1e3 * alone:9.3f} ms of processor time a run by one worker,"
+            f"{1e3 * paired:9.3f} ms by each of two"
         )
         print(f"{'':15}two workers make {gain:.2f} times as many runs")
     run, database, table = keeping(100_000)
@@ -173,11 +173,11 @@ def main() -> None:
 
     cores = options.nodes * options.cores
     print(f"{options.runs:g} runs on {options.nodes} nodes of {options.cores} cores:")
-    for name, one in costs.items():
-        total = options.runs * one / 3600
+    for name, alone in costs.items():
+        total = options.runs * alone / 3600
         print(
             f"{name:15}{total:10,.0f} core hours,{total / cores:8.2f} h by all cores; "
-            f"who sends them keeps up with {one / run:,.0f}"
+            f"who sends them keeps up with {alone / run:,.0f}"
         )
     keep = options.runs * run / 3600
     print(

@@ -48,15 +48,15 @@ def mistakes(path: Path, folder: Path, is_index: bool = False) -> list[str]:
             f"{no_component(script)}; if it has a class of PythonFMU, build it and check its FMU: "
             f"auv-fmu build {script}"
         )
-    found: dict[str, str] = {}
+    texts: dict[str, str] = {}
     try:
         for text in _mistakes(script, folder, is_index):
             # Report the first problem of each line only: others follow from it.
             place = PLACED.match(text)
-            found.setdefault(place[0] if place else text, text)
+            texts.setdefault(place[0] if place else text, text)
     except RecursionError as error:
-        found[""] = message_of(error, script)
-    return sorted(found.values(), key=position)
+        texts[""] = message_of(error, script)
+    return sorted(texts.values(), key=position)
 
 
 def _mistakes(script: Path, folder: Path, is_index: bool) -> Iterator[str]:
@@ -110,8 +110,8 @@ def main() -> int:
     try:
         # Keep the component's own output apart from the list.
         with TemporaryDirectory() as folder, redirect_stdout(sys.stderr):
-            found = mistakes(options.script, options.out or Path(folder), options.index)
-        print("".join(f"{text}\n" for text in found), end="")
+            lines = mistakes(options.script, options.out or Path(folder), options.index)
+        print("".join(f"{text}\n" for text in lines), end="")
     except ValueError as error:
         print(error, file=sys.stderr)
         return 2

@@ -143,16 +143,16 @@ def _tables(ports: Sequence[Port], types: Mapping[str, str]) -> Iterator[str]:
         ("output", "Outputs"),
         ("parameter", "Parameters"),
     ):
-        found = [port for port in ports if port.causality == causality]
-        if not found:
+        chosen = [port for port in ports if port.causality == causality]
+        if not chosen:
             continue
         columns = ["name", "unit or type", "description"]
         if causality == "parameter":
             columns[2:2] = ["start", "range"]
-        elif any(port.feedthrough for port in found):
+        elif any(port.feedthrough for port in chosen):
             columns.append("direct feedthrough from")
         lines = ["| " + " | ".join(columns) + " |", "|---" * len(columns) + "|"]
-        rows = (_row(ports, types)[: len(columns)] for ports in _alike(found))
+        rows = (_row(ports, types)[: len(columns)] for ports in _alike(chosen))
         lines += ["| " + " | ".join(row) + " |" for row in rows]
         yield f"## {heading}\n\n" + "\n".join(lines)
 
@@ -173,8 +173,8 @@ def _alike(ports: Sequence[Port]) -> Iterable[list[list[Port]]]:
 
 def _described(port: Port) -> str:
     """Return the description without the name of a member at its end."""
-    found = _MEMBER.search(port.name)
-    end = f": {found[0].strip('.[]')}" if found else ""
+    match = _MEMBER.search(port.name)
+    end = f": {match[0].strip('.[]')}" if match else ""
     return port.description.removesuffix(end).replace("|", r"\|")
 
 
@@ -186,15 +186,15 @@ def _groups(port: Port) -> str:
 
 def _row(members: Sequence[Sequence[Port]], types: Mapping[str, str]) -> list[str]:
     port = members[0][0]
-    cells = [_names([one[0] for one in members])]
+    cells = [_names([member[0] for member in members])]
     if len(members[0]) > 1:
-        cells[0] += f" to {_names([one[-1] for one in members])}"
-    units = dict.fromkeys(one[0].unit or types.get(port.type, port.type) for one in members)
+        cells[0] += f" to {_names([member[-1] for member in members])}"
+    units = dict.fromkeys(member[0].unit or types.get(port.type, port.type) for member in members)
     cells.append(", ".join(units))
     description = _described(port)
     if port.causality != "parameter":
         return [*cells, description, _groups(port)]
-    starts = [_starts(one) for one in members]
+    starts = [_starts(member) for member in members]
     if len({*starts}) == 1:
         starts = starts[:1]
     tunable = "; tunable" if port.variability == "tunable" else ""
@@ -210,7 +210,7 @@ def _names(ports: Sequence[Port]) -> str:
 
 
 def _starts(ports: Sequence[Port]) -> str:
-    starts = [_start(one) for one in ports]
+    starts = [_start(port) for port in ports]
     while len(starts) > 1 and starts[-1] == starts[-2]:
         starts.pop()
     return ", ".join(starts)

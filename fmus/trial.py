@@ -95,15 +95,15 @@ def _set(slave: Any, causality: str, values: Mapping[str, Any]) -> None:
     """Set ports of a causality, singly or as whole vectors."""
     known = _ports(slave, causality)
     for name, value in values.items():
-        found = [one for one in known if name in (one[1].name, group_name(one[1].name))]
-        if not found:
+        pairs = [pair for pair in known if name in (pair[1].name, group_name(pair[1].name))]
+        if not pairs:
             names = ", ".join(port.name for _, port in known) or "none"
             raise ValueError(f"no {causality} {name!r}; there are: {names}")
-        given = [value] if found[0][1].name == name else [*flat(value)]
-        if len(given) != len(found):
-            raise ValueError(f"{name}: {len(given)} values for {len(found)} ports")
-        for (reference, port), one in zip(found, given):
-            getattr(slave, f"set_{_passed_as(port)}")([reference], [_converted(port, one)])
+        given = [value] if pairs[0][1].name == name else [*flat(value)]
+        if len(given) != len(pairs):
+            raise ValueError(f"{name}: {len(given)} values for {len(pairs)} ports")
+        for (reference, port), item in zip(pairs, given):
+            getattr(slave, f"set_{_passed_as(port)}")([reference], [_converted(port, item)])
     if causality == "input":
         # Unchanged inputs are inputs of a new time, too.
         slave._forget("inputs")

@@ -194,7 +194,7 @@ def workplace(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., str]:
     """A function that returns the one line with which `auv-fmu` refuses arguments."""
 
-    def said(*arguments: str, status: int = 2) -> str:
+    def line_of(*arguments: str, status: int = 2) -> str:
         capsys.readouterr()
         before = {*tmp_path.rglob("*")}
         assert main([*arguments]) == status
@@ -206,4 +206,4 @@ def refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[...,
         assert len(line) < 600
         return str(line)
 
-    return said
+    return line_of

@@ -54,9 +54,9 @@ def main() -> None:
         rooms[module.room].append(module)
         if not is_short:
             print(f"{module.path.as_posix():50} {module.lines:4}  {module.first_line}")
-    for room, found in {**rooms, "all": house}.items():
-        lines = [module.lines for module in found]
-        print(f"{room:32} {len(found):4} modules {sum(lines):6} lines, median {median(lines):g}")
+    for room, listed in {**rooms, "all": house}.items():
+        lines = [module.lines for module in listed]
+        print(f"{room:32} {len(listed):4} modules {sum(lines):6} lines, median {median(lines):g}")
 
 
 if __name__ == "__main__":

@@ -116,11 +116,11 @@ class Runs:
         """The indices of several runs."""
         points = (self.point(name, values, step, stop_time) for values in draws)
         found = [outcome.indices for outcome in self._engine.outcomes(points)]
-        return {key: np.array([one[key] for one in found]) for key in found[0]}
+        return {key: np.array([indices[key] for indices in found]) for key in found[0]}
 
     def variation_ratio(self, name: str, until: float, values: Values, step: float = STEP) -> Any:
         """Total variation of each signal up to a time, PD over proposed."""
-        both = (self.table(one, values, step) for one in (f"{name}-pd", name))
+        both = (self.table(scenario, values, step) for scenario in (f"{name}-pd", name))
         return np.divide(*(total_variation_until(made, until) for made in both))
 
 
@@ -213,7 +213,7 @@ def accuracy() -> None:
     for name in REGULAR:
         found = [runs.indices(name, [values], h) for values, h in WAYS]
         for index, column in INDICES.items():
-            values = [float(one[column][0]) for one in found]
+            values = [float(indices[column][0]) for indices in found]
             changes = [abs(value / values[0] - 1.0) for value in values]
             if max(changes) <= MUCH:
                 same.append(max(changes))
@@ -229,7 +229,10 @@ def accuracy() -> None:
     ]
     show(
         [f"`{CHAOTIC}`", *HEADS],
-        [[index, *(between(one[column]) for one in ends)] for index, column in INDICES.items()],
+        [
+            [index, *(between(ending[column]) for ending in ends)]
+            for index, column in INDICES.items()
+        ],
     )
     rows = []
     for name, until in (("fig5", 100.0), ("fig6", 60.0)):
@@ -297,10 +300,10 @@ def continuous(system: System, stop: float) -> np.ndarray:
         return np.array([*flat(moving), *(0.0 for _ in flat((state.tau, state.water))), *rest])
 
     times = STEP * np.arange(round(stop / STEP) + 1)
-    found = solve_ivp(
+    solution = solve_ivp(
         rates, (0.0, stop), flat(start), "DOP853", t_eval=times, rtol=1e-9, atol=1e-11
     )
-    states = zip(found.t, found.y.T, strict=True)
+    states = zip(solution.t, solution.y.T, strict=True)
     return np.array([unpacked(t, x)[2].plant.y for t, x in states])
 
 
@@ -384,7 +387,10 @@ def noise() -> None:
         quiet = runs.indices(name, [{**values, **QUIET}])
         found = runs.indices(name, draws(MANY, values))
         (still, peaks), (never, shares) = (
-            [np.column_stack([one[f"{index}.{k}"] for k in ACTUATORS]) for one in (quiet, found)]
+            [
+                np.column_stack([indices[f"{index}.{k}"] for k in ACTUATORS])
+                for indices in (quiet, found)
+            ]
             for index in ("peak_command", "saturated_fraction")
         )
         cells = [numbers(still[0]), numbers(100 * never[0]), *map(band, peaks.T)]
@@ -415,8 +421,8 @@ def noise() -> None:
     ):  # fmt: skip
         firsts: list[float] = []
         columns: list[list[float]] = []
-        for one in draws(SOME, values):
-            made = runs.table(name, one, stop_time=1000.0)
+        for draw in draws(SOME, values):
+            made = runs.table(name, draw, stop_time=1000.0)
             commands, time = np.abs(made.step_values(*STANDARD.commanded)), made.step_start
             beyond = (commands > limits(made)[1]).any(axis=1)
             firsts.append(time[beyond.argmax()] if beyond.any() else np.inf)
@@ -439,7 +445,7 @@ def noise() -> None:
             for system in (system_of(name), system_of(f"{name}-pd"))
         ]
         rows = [
-            [text, *(band(one[text] for one in runs_of) for runs_of in pair)] for text in pair[0][0]
+            [text, *(band(run[text] for run in runs_of) for runs_of in pair)] for text in pair[0][0]
         ]
         show([f"`{name}`", "proposed", "PD"], rows)
 
@@ -490,16 +496,19 @@ def seed_numbers(scenario: str, made: Table, loops: Sequence[Loop]) -> dict[str,
         text = f"error from {start:g} s to {min(end, made.time[-1]):g} s [m]"
         found[text] = sizes[:, here].max()
     commands = [made.step_values(*loop.commanded) for loop in loops]
-    found["peak command u [N]"] = max(np.abs(one[:, 0]).max() for one in commands)
-    found["peak command q, r [N.m]"] = max(np.abs(one[:, 1:]).max() for one in commands)
+    found["peak command u [N]"] = max(np.abs(command[:, 0]).max() for command in commands)
+    found["peak command q, r [N.m]"] = max(np.abs(command[:, 1:]).max() for command in commands)
     if scenario == "remus":
         attained = made.step_values(*(f"allocation.tau_attained.{k}" for k in ACTUATORS))
         beyond = [np.abs(commands[0] - attained) > 1e-9]
     else:
         ends = (limits(made, loop) for loop in loops)
-        beyond = [(one < low) | (one > up) for one, (low, up) in zip(commands, ends, strict=True)]
+        beyond = [
+            (command < low) | (command > up)
+            for command, (low, up) in zip(commands, ends, strict=True)
+        ]
     for i, actuator in enumerate(ACTUATORS):
-        share = max(one[:, i].mean() for one in beyond)
+        share = max(mask[:, i].mean() for mask in beyond)
         found[f"steps beyond the limits, {actuator} [%]"] = 100.0 * share
     if len(loops) > 1:
         found[f"{SMALLEST_DISTANCE_LABEL} [m]"] = smallest_distances(made, loops).min()
@@ -749,8 +758,8 @@ def gains(n: int = 1) -> None:
                 )
                 for seed in range(1, n + 1)
             ]
-            best = min(found, key=lambda one: float(one.fun))
-            others = ", ".join(f"{exp(one.fun):.3g}" for one in found)
+            best = min(found, key=lambda fit: float(fit.fun))
+            others = ", ".join(f"{exp(fit.fun):.3g}" for fit in found)
             print(
                 f"{scenario}, commands up to {limit:g}: {exp(best.fun):.3g} m (by seed: {others})"
             )
@@ -778,11 +787,11 @@ def bound(column: Any) -> str:
     return f"{column.sum()} of {len(column)}, {100 * (1 - 0.05 ** (1 / len(column))):.2g} %"
 
 
-def rank(one: Any, other: Any) -> str:
+def rank(x: Any, y: Any) -> str:
     """Spearman's correlation of two columns, and its standard error; it misses U shapes."""
     from scipy.stats import spearmanr  # noqa: PLC0415
 
-    return f"{spearmanr(one, other).statistic:.3f} ± {(len(one) - 1) ** -0.5:.3f} (n = {len(one)})"
+    return f"{spearmanr(x, y).statistic:.3f} ± {(len(x) - 1) ** -0.5:.3f} (n = {len(x)})"
 
 
 #: Statistics of columns, by the first word of a line.
@@ -800,8 +809,8 @@ STATISTICS: Mapping[str, Callable[..., str]] = {
 def queries(study: str) -> dict[str, Any]:
     """The part of page_numbers.toml about a study."""
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    found: dict[str, Any] = tomllib.loads(text)[study]
-    return found
+    table: dict[str, Any] = tomllib.loads(text)[study]
+    return table
 
 
 def lines_of(study: str) -> list[str]:
@@ -923,8 +932,8 @@ def machine() -> str:
 
 #: Functions by name.
 PAGES: Mapping[str, Callable[..., int | None]] = {
-    one.__name__: one
-    for one in (accuracy, noise, seeds, remus, networks, gains, studies, benchmarks)
+    function.__name__: function
+    for function in (accuracy, noise, seeds, remus, networks, gains, studies, benchmarks)
 }
 
 

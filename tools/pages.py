@@ -259,7 +259,7 @@ def _section(study: Study) -> str:
         settings["stop_time"] = study.stop_time.base
     stated = [study.scenario[0], *(f"{key}={value}" for key, value in settings.items())]
     # The live page does not accept stars in names.
-    live = "" if any("*" in one for one in stated) else f" <!-- live: {'&'.join(stated)} -->"
+    live = "" if any("*" in part for part in stated) else f" <!-- live: {'&'.join(stated)} -->"
     pictures = (
         f"![{seen(study, name)}](../{PICTURES}/studies/{study.name}-{name}.png)"
         for name in study.figures
@@ -305,16 +305,16 @@ class _WithoutNull(GenerateJsonSchema):
 def paper() -> dict[str, str]:
     """Numbers in docs/explanation/paper.md."""
     vehicle = Vehicle()
-    found = theorem(vehicle, ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
-    k, there = coupling(vehicle, ELL), found.bounds.lambda_d2
-    speed, power = found.speed_of_any_gains, found.alpha_1_of_any_gains
+    result = theorem(vehicle, ELL, Gains(), MAXIMUM_SLOPE[Saturation.TANH])
+    k, there = coupling(vehicle, ELL), result.bounds.lambda_d2
+    speed, power = result.speed_of_any_gains, result.alpha_1_of_any_gains
     turning = vehicle.m55 / ELL**3
     skew = (vehicle.m66 / ELL**2 - vehicle.m11) / ELL
-    of_theta = found.bounds.lambda_M2
+    of_theta = result.bounds.lambda_M2
     slow = theorem(vehicle, ELL, Gains(lambda_=0.1), MAXIMUM_SLOPE[Saturation.TANH], 0.05)
     sigma = Gains().sigma
     return {
-        "theorem": "```text\n" + "\n".join(stated(found)) + "\n```",
+        "theorem": "```text\n" + "\n".join(stated(result)) + "\n```",
         "missing_force": f"{0.1 * turning * vehicle.m11 / vehicle.m33:.1f}",
         "skew_part": f"{0.2 * skew:.0f}",
         "power_of_p2_2": f"{-0.5 * vehicle.m66 / ELL**3:.0f}",
@@ -324,19 +324,19 @@ def paper() -> dict[str, str]:
         "zetas_when_slow": f"{slow.conditions[1].least:.1f}",
         "k_d_when_slow": f"{slow.conditions[2].least:.1f}",
         "x_when_slow": f"{slow.x_of_any_gains:.2f}",
-        "zetas_of_any_gains": f"{found.zeta_of_any_gains:.1f}",
+        "zetas_of_any_gains": f"{result.zeta_of_any_gains:.1f}",
         "coupling": f"{k:.1f}",
         "quarter_of_the_coupling": f"{0.25 * k:.1f}",
         "largest_speed": f"{speed:.2f}",
         "largest_lambda": f"{2.0 * speed:.2f}",
         # With vanishing gains (31) asks for k / 4 < d11, and k falls with the cube of ell.
-        "least_ell": f"{ELL * cbrt(found.zeta_of_any_gains / there):.2f}",
+        "least_ell": f"{ELL * cbrt(result.zeta_of_any_gains / there):.2f}",
         "ball": f"{ball(0.0, 1.0, sigma):.1f}",
         "ball_of_theta": f"{ball(of_theta, 1.0, sigma):.0f}",
         "largest_alpha_1": f"{power:.3f}",
         "largest_eps_t": f"{power / 3.0:.2f}",
-        "x_of_any_gains": f"{found.x_of_any_gains:.2f}",
-        "x_at_most": f"{found.x_at_most:.2f}",
+        "x_of_any_gains": f"{result.x_of_any_gains:.2f}",
+        "x_at_most": f"{result.x_at_most:.2f}",
     }
 
 
@@ -344,7 +344,7 @@ def command_line() -> dict[str, str]:
     """Parts of docs/reference/command-line.md: common arguments, and a section for each command."""
     top = commands(parser(COMMANDS))
     leaves = [leaf for command in top.values() for leaf in commands(command).values() or [command]]
-    rows = Counter(_row(one) for leaf in leaves for one in _arguments(leaf))
+    rows = Counter(_row(argument) for leaf in leaves for argument in _arguments(leaf))
     common = {row for row, uses in rows.items() if uses > 1}
     sections = (
         section
@@ -397,8 +397,8 @@ def _sections(
         if isinstance(action, argparse._SubParsersAction)
         for choice in action._choices_actions
     }
-    for one, subcommand in below.items():
-        yield from _sections(f"{name} {one}", texts[one], subcommand, common, level + 1)
+    for word, subcommand in below.items():
+        yield from _sections(f"{name} {word}", texts[word], subcommand, common, level + 1)
 
 
 def _usage(name: str, actions: Sequence[argparse.Action]) -> str:
@@ -474,7 +474,7 @@ def gallery() -> str:
     """The scenarios in docs/gallery.md, two in a row."""
     cells = [*map(_scenario, sorted(map(read_scenario, names()), key=_place))]
     pairs = zip_longest(cells[::2], cells[1::2], fillvalue="")
-    return "\n".join(["| | |", "|---|---|", *(f"| {one} | {other} |" for one, other in pairs)])
+    return "\n".join(["| | |", "|---|---|", *(f"| {left} | {right} |" for left, right in pairs)])
 
 
 def seen(study: Study, figure: str) -> str:
@@ -484,7 +484,7 @@ def seen(study: Study, figure: str) -> str:
 
     def words(columns: str | list[str] | None) -> str:
         named = [columns] if isinstance(columns, str) else columns or []
-        called = (labels.get(one) or Values({}).label(one) for one in named)
+        called = (labels.get(column) or Values({}).label(column) for column in named)
         return ", ".join(re.sub(r" \[.*\]$|[|]|\$.*\$, ", "", text) for text in called)
 
     x, y, show = declared.x, declared.y, declared.show

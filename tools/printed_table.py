@@ -158,9 +158,11 @@ def score(twelve: np.ndarray) -> np.ndarray:
 
 def run_of(scenario: str, chosen: Mapping[str, Option]) -> Point:
     """The run with an option of each choice."""
-    used = [one for name, one in chosen.items() if scenario == "fig5" or name not in OF_PROPOSED]
-    parameters = {name: value for one in used for name, value in one.parameters.items()}
-    order = next((one.order for one in used if one.order), None)
+    used = [
+        option for name, option in chosen.items() if scenario == "fig5" or name not in OF_PROPOSED
+    ]
+    parameters = {name: value for option in used for name, value in option.parameters.items()}
+    order = next((option.order for option in used if option.order), None)
     return Point(0, scenario, parameters, float(END_TIMES[-1]), STEP, order)
 
 
@@ -195,7 +197,9 @@ class Variants:
         points = list({str(run): run for pair in self.runs for run in pair}.values())
         blocks = {i: partial(task, points[i : i + size]) for i in range(0, len(points), size)}
         found = dict(crew.results(blocks, "block"))
-        made = dict(zip(map(str, points), (one for i in blocks for one in found[i]), strict=True))
+        made = dict(
+            zip(map(str, points), (outcome for i in blocks for outcome in found[i]), strict=True)
+        )
         #: With axes for the combination, SIGNALS, END_TIMES, and the numbers.
         self.twelve = np.stack(
             [np.concatenate([made[str(run)][0] for run in pair], -1) for pair in self.runs]
@@ -228,7 +232,7 @@ class Variants:
     def near(self, tolerance: float) -> int:
         """Largest number of the twelve that are within a tolerance at once."""
         away = (np.abs(as_read(self.twelve, *reading) / PRINTED - 1.0) for reading in READINGS)
-        return max(int((one <= tolerance).sum(axis=-1).max()) for one in away)
+        return max(int((distances <= tolerance).sum(axis=-1).max()) for distances in away)
 
     def efforts_within(self, formula: int) -> float:
         """Least distance of all six efforts at once, over consistent variants that have arrived."""
@@ -269,9 +273,9 @@ def print_variants(crew: Workers, engine: BatchEngine, six: Variants, five: Vari
             f"{score(values):.2f}", f"{np.exp(score(values) / 12):.2f}",
         ])  # fmt: skip
         words = [
-            f"{name}: {one.text}"
-            for name, one in held.chosen[i].items()
-            if one.parameters or one.order
+            f"{name}: {option.text}"
+            for name, option in held.chosen[i].items()
+            if option.parameters or option.order
         ]
         order, formula = READINGS[reading]
         words += [SIGNALS[signal].text, ORDERS[order].text, FORMULAS[formula].text]
@@ -315,21 +319,25 @@ def print_rest(six: Variants, five: Variants) -> None:
         )
     rows = []
 
-    def add(choice: str, one: Option, mask: Any) -> None:
+    def add(choice: str, option: Option, mask: Any) -> None:
         best = [float(scores[mask].min()) for scores in (six.consistent, six.scores)]
-        rows.append([choice, one.text, *(f"{x:.2f}" * bool(x < np.inf) for x in best), one.against])
+        rows.append(
+            [choice, option.text, *(f"{x:.2f}" * bool(x < np.inf) for x in best), option.against]
+        )
 
     for choice, some in CHOICES.items():
-        for one in some:
-            add(choice, one, np.array([chosen[choice] is one for chosen in six.chosen]))
+        for option in some:
+            add(choice, option, np.array([chosen[choice] is option for chosen in six.chosen]))
         if choice == "vehicle":
             least = f"{five.consistent.min():.2f}, of medians"
             rows.append([choice, FIVE.text, "", least, FIVE.against])
-    for i, one in enumerate(SIGNALS):
-        add("efforts of the signal", one, (slice(None), i))
+    for i, option in enumerate(SIGNALS):
+        add("efforts of the signal", option, (slice(None), i))
     for k, (choice, some) in enumerate({"order": ORDERS, "formula": FORMULAS}.items()):
-        for i, one in enumerate(some):
-            add(f"{choice} of the efforts", one, (..., [reading[k] == i for reading in READINGS]))
+        for i, option in enumerate(some):
+            add(
+                f"{choice} of the efforts", option, (..., [reading[k] == i for reading in READINGS])
+            )
     for k, row in reversed([*enumerate(rows)][1:]):
         row[0] *= row[0] != rows[k - 1][0]
     print("\n" + table(["open", "option", "best score", "best of all", "contradicts"], rows))
@@ -339,7 +347,9 @@ def main() -> None:
     """Make all runs, and print."""
     argparse.ArgumentParser(description=__doc__.splitlines()[0]).parse_args()
     engine = BatchEngine({scenario: load_scenario(scenario)[1] for scenario in SCENARIOS})
-    of_five = {name: [one for one in some if not one.against] for name, some in CHOICES.items()}
+    of_five = {
+        name: [option for option in some if not option.against] for name, some in CHOICES.items()
+    }
     of_five["vehicle"] = [FIVE._replace(against="")]
     with workers() as crew:
         six = Variants(crew, CHOICES, partial(single, engine), 16)

@@ -194,11 +194,11 @@ def comment_blocks(text: str) -> Iterator[Block]:
 
 def c_blocks(text: str) -> Iterator[Block]:
     """Yield the comments of a file in C or TypeScript."""
-    for found in _C_COMMENT.finditer(text):
-        words = found["block"] or found["line"]
+    for comment in _C_COMMENT.finditer(text):
+        words = comment["block"] or comment["line"]
         if words and not _ORDER.match(words.strip()):
             words = re.sub(r"(?m)^[ \t]*(?://|\*+(?!/))?[ \t]?", "", words)
-            line = 1 + text.count("\n", 0, found.start())
+            line = 1 + text.count("\n", 0, comment.start())
             yield Block(line, without_code(words.lstrip("*! \t")), False, is_inside=True)
 
 

@@ -106,16 +106,19 @@ def reference_inputs(component: Component, span: Span = SPAN) -> np.ndarray:
     """
     inputs = component.having("input")
     time = span.times
-    kinds = ((one.name, np.int32 if one.type == "Boolean" else np.float64) for one in inputs)
+    kinds = (
+        (variable.name, np.int32 if variable.type == "Boolean" else np.float64)
+        for variable in inputs
+    )
     table = np.zeros(len(time), dtype=[("time", np.float64), *kinds])
     table["time"] = time
-    for i, one in enumerate(inputs, start=1):
+    for i, variable in enumerate(inputs, start=1):
         sine = np.sin((0.5 + 0.1 * i) * (STOP_TIME / span.stop_time * time))
-        if one.type == "Boolean":
-            table[one.name] = sine >= 0.0
+        if variable.type == "Boolean":
+            table[variable.name] = sine >= 0.0
         else:
-            start = float(component.starts[one.name])
-            table[one.name] = start + 0.1 * (abs(start) or 1.0) * sine
+            start = float(component.starts[variable.name])
+            table[variable.name] = start + 0.1 * (abs(start) or 1.0) * sine
     return table
 
 
@@ -142,7 +145,7 @@ def reference_outputs(
         output_interval=span.step,
         start_values=dict(values or {}),
         input=inputs,
-        output=[one.name for one in outputs if one.name != FAULT.name],
+        output=[variable.name for variable in outputs if variable.name != FAULT.name],
     )
     # fmpy reads only numbers.
     kinds = [

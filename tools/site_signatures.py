@@ -26,16 +26,16 @@ class Signatures(griffe.Extension):
         function = getattr(import_module(func.module.path), func.name)
         func.docstring.value = cleandoc(function.__doc__)
         func.parameters = griffe.Parameters(
-            *(_parameter(one, func) for one in signature(function).parameters.values())
+            *(_parameter(parameter, func) for parameter in signature(function).parameters.values())
         )
 
 
-def _parameter(one: Parameter, func: griffe.Function) -> griffe.Parameter:
-    text = _PREFIX.sub("", formatannotation(one.annotation)).replace("NoneType", "None")
+def _parameter(parameter: Parameter, func: griffe.Function) -> griffe.Parameter:
+    text = _PREFIX.sub("", formatannotation(parameter.annotation)).replace("NoneType", "None")
     annotation = griffe.safe_get_annotation(ast.parse(text, mode="eval").body, parent=func.module)
     return griffe.Parameter(
-        one.name,
+        parameter.name,
         annotation=annotation,
-        kind=griffe.ParameterKind(one.kind.description),
-        default=None if one.default is one.empty else repr(one.default),
+        kind=griffe.ParameterKind(parameter.kind.description),
+        default=None if parameter.default is parameter.empty else repr(parameter.default),
     )

@@ -89,8 +89,8 @@ class Item:
                 text = archive.read("modelDescription.xml").decode(errors="replace")
         except (OSError, KeyError, BadZipFile):
             return ""
-        found = re.search(r"fmiVersion\s*=\s*[\"']([^\"']*)", text)
-        return found[1] if found else ""
+        match = re.search(r"fmiVersion\s*=\s*[\"']([^\"']*)", text)
+        return match[1] if match else ""
 
 
 def collect(folder: Path) -> list[Item]:
@@ -100,19 +100,19 @@ def collect(folder: Path) -> list[Item]:
         folder: that keeps the clones and the files; what it has is not fetched again.
 
     """
-    found: dict[str, Item] = {}
+    by_key: dict[str, Item] = {}
     for place, commit in PLACES.items():
         for item, content in _items(_Clone(folder / "clones" / place, place, commit)):
             key = hashlib.sha256(content).hexdigest() if content is not None else item.name
-            if key in found:
-                found[key] = replace(found[key], copies=found[key].copies + 1)
+            if key in by_key:
+                by_key[key] = replace(by_key[key], copies=by_key[key].copies + 1)
                 continue
-            found[key] = item
+            by_key[key] = item
             if content is not None:
                 file = folder / item.file
                 file.parent.mkdir(parents=True, exist_ok=True)
                 file.write_bytes(content)
-    items = list(found.values())
+    items = list(by_key.values())
     text = json.dumps([asdict(item) for item in items], indent=1)
     (folder / _LIST).write_text(text, encoding="utf-8")
     return items

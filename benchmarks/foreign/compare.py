@@ -40,38 +40,38 @@ def compared(items: Sequence[Item], folder: Path, workers: int) -> dict[str, dic
 
 
 def _one(folder: Path, item: Item) -> dict[str, Any]:
-    found = {**asdict(item), "is_fmu": item.is_fmu}
+    entry = {**asdict(item), "is_fmu": item.is_fmu}
     if not item.file:
-        return {**found, "outcome": "absent", "reason": ""}
+        return {**entry, "outcome": "absent", "reason": ""}
     with TemporaryDirectory() as temporary:
         examine = _fmu if item.is_fmu else _archive
-        found |= examine(folder.resolve() / item.file, Path(temporary))
-    print(f"{item.name}: {found['outcome']} {found['reason']}", flush=True)
-    return found
+        entry |= examine(folder.resolve() / item.file, Path(temporary))
+    print(f"{item.name}: {entry['outcome']} {entry['reason']}", flush=True)
+    return entry
 
 
 def _fmu(file: Path, folder: Path) -> dict[str, Any]:
     """Compare an FMU with a plain host, with its own parameters and with others."""
-    found = _ours(file, folder / "default.json")
-    if found["outcome"] == "runs":
-        found["deviation"] = _against(_HERE / "host.py", file, folder / "default.json")
+    entry = _ours(file, folder / "default.json")
+    if entry["outcome"] == "runs":
+        entry["deviation"] = _against(_HERE / "host.py", file, folder / "default.json")
         changed = _ours(file, folder / "changed.json", "--changed")
-        found["changed"] = changed
+        entry["changed"] = changed
         if changed["outcome"] == "runs" and changed["wanted"]:
             changed["deviation"] = _against(_HERE / "host.py", file, folder / "changed.json")
-    return found
+    return entry
 
 
 def _archive(file: Path, folder: Path) -> dict[str, Any]:
     """Run an archive in the default order, and compare it with other masters in theirs."""
-    found = _ours(file, folder / "default.json")
+    entry = _ours(file, folder / "default.json")
     jacobi = _ours(file, folder / "jacobi.json", "--order", "jacobi")
     if jacobi["outcome"] == "runs":
-        found["tools"] = {
+        entry["tools"] = {
             tool: _against(_HERE / "other_masters.py", tool, file, folder / "jacobi.json", skip=1)
             for tool in TOOLS
         }
-    return found
+    return entry
 
 
 def _ours(file: Path, out: Path, *options: str) -> dict[str, Any]:
@@ -135,7 +135,7 @@ def _run(*command: object) -> str:
             start_new_session=True,
         )
         try:
-            said = process.communicate(timeout=PATIENCE)[1].decode(errors="replace").strip()
+            complaint = process.communicate(timeout=PATIENCE)[1].decode(errors="replace").strip()
         except subprocess.TimeoutExpired:
             # An FMU may have started programs of its own.
             os.killpg(process.pid, signal.SIGKILL)
@@ -143,7 +143,11 @@ def _run(*command: object) -> str:
             return f"no end after {PATIENCE} s"
     if process.returncode < 0:
         return signal.Signals(-process.returncode).name
-    return said.splitlines()[-1][:_LONGEST_REASON] if said else f"status {process.returncode}"
+    return (
+        complaint.splitlines()[-1][:_LONGEST_REASON]
+        if complaint
+        else f"status {process.returncode}"
+    )
 
 
 def _same(held: Any, wanted: Any) -> bool:

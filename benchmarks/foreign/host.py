@@ -133,8 +133,8 @@ class Host:
 
     def access(self, action: str, variable: Variable, values: Any, *more: object) -> None:
         """Get or set a variable."""
-        reference, one = ctypes.c_uint(variable.reference), ctypes.c_size_t(1)
-        self.call(f"{action}{variable.type}", ctypes.byref(reference), one, values, *more)
+        reference, count = ctypes.c_uint(variable.reference), ctypes.c_size_t(1)
+        self.call(f"{action}{variable.type}", ctypes.byref(reference), count, values, *more)
 
     def step(self, time: float, length: float) -> None:
         """Make a step."""
@@ -187,10 +187,10 @@ class Host3(Host):
 
     def step(self, time: float, length: float) -> None:
         """Make a step."""
-        said = [ctypes.byref(ctypes.c_bool()) for _ in range(3)]
+        flags = [ctypes.byref(ctypes.c_bool()) for _ in range(3)]
         last = ctypes.byref(ctypes.c_double())
         yes = ctypes.c_bool(True)
-        self.call("DoStep", ctypes.c_double(time), ctypes.c_double(length), yes, *said, last)
+        self.call("DoStep", ctypes.c_double(time), ctypes.c_double(length), yes, *flags, last)
 
 
 def host_of(fmu: Path) -> Host:

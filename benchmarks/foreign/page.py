@@ -61,34 +61,34 @@ every archive what its run reported. Files with the same bytes count once.
 """
 
 
-def page(found: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
+def page(files: Sequence[Mapping[str, Any]], lines_of_host: int) -> str:
     """Text of the page."""
     head = _HEAD.format(steps=STEPS, host=lines_of_host, tools=" and ".join(_tools()))
-    there = [one for one in found if one["outcome"] != "absent"]
-    archives = [one for one in there if not one["is_fmu"]]
-    fmus = [one for one in there if one["is_fmu"]]
+    there = [file for file in files if file["outcome"] != "absent"]
+    archives = [file for file in there if not file["is_fmu"]]
+    fmus = [file for file in there if file["is_fmu"]]
     parts = [head.rstrip("\n"), *_archives(archives), *_fmus(fmus), *_parameters(fmus)]
     return "\n".join([*parts, *_not_running(archives, fmus), ""])
 
 
-def listed(found: Sequence[Mapping[str, Any]]) -> str:
+def listed(files: Sequence[Mapping[str, Any]]) -> str:
     """Table of files in CSV: reasons of those that do not run, and messages of archives."""
     text = StringIO()
     table = writer(text, lineterminator="\n")
     table.writerow(("kind", "file", "outcome"))
-    for one in found:
-        kind = "FMU" if one["is_fmu"] else "archive"
-        changed = one.get("changed", {})
+    for file in files:
+        kind = "FMU" if file["is_fmu"] else "archive"
+        changed = file.get("changed", {})
         if changed.get("lost"):
-            table.writerow((kind, _name(one), f"does not take {', '.join(changed['lost'])}"))
+            table.writerow((kind, _name(file), f"does not take {', '.join(changed['lost'])}"))
         if changed.get("outcome", "runs") != "runs":
-            table.writerow((kind, _name(one), f"with other parameters {_why(changed)}"))
-        if one["outcome"] == "absent":
-            table.writerow((kind, _name(one), "could not be fetched"))
-        elif one["outcome"] != "runs":
-            table.writerow((kind, _name(one), _why(one)))
-        elif not one["is_fmu"]:
-            table.writerow((kind, _name(one), f"runs: {_said(one['said'])}"))
+            table.writerow((kind, _name(file), f"with other parameters {_why(changed)}"))
+        if file["outcome"] == "absent":
+            table.writerow((kind, _name(file), "could not be fetched"))
+        elif file["outcome"] != "runs":
+            table.writerow((kind, _name(file), _why(file)))
+        elif not file["is_fmu"]:
+            table.writerow((kind, _name(file), f"runs: {_said(file['said'])}"))
     return text.getvalue()
 
 
@@ -101,17 +101,17 @@ def _tools() -> Iterator[str]:
 
 
 def _archives(archives: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    running = [one for one in archives if one["outcome"] == "runs"]
+    running = [file for file in archives if file["outcome"] == "runs"]
     yield f"\n## Archives\n\n{len(running)} of {len(archives)} run."
     yield "Deviations of those that other programs run:\n"
     yield f"| archive | rows | {' | '.join(TOOLS)} |"
     yield f"| --- | --: |{' --- |' * len(TOOLS)}"
-    for one in running:
-        tools = one.get("tools", {})
+    for file in running:
+        tools = file.get("tools", {})
         if all(isinstance(tools.get(tool, ""), str) for tool in TOOLS):
             continue
-        cells = (_compared(one, tool, tools.get(tool, "")) for tool in TOOLS)
-        yield f"| {_name(one)} | {one['rows']} | {' | '.join(cells)} |"
+        cells = (_compared(file, tool, tools.get(tool, "")) for tool in TOOLS)
+        yield f"| {_name(file)} | {file['rows']} | {' | '.join(cells)} |"
 
 
 def _said(lines: Sequence[str]) -> str:
@@ -120,56 +120,58 @@ def _said(lines: Sequence[str]) -> str:
     return f"{_cell(lines[0])}{more}" if lines else ""
 
 
-def _compared(one: Mapping[str, Any], tool: str, deviation: float | str) -> str:
+def _compared(file: Mapping[str, Any], tool: str, deviation: float | str) -> str:
     """Result of a comparison: a number, or the reason that there is none."""
     if isinstance(deviation, str):
         return "not run" if deviation else ""
     if deviation <= SYSTEM_BOUND:
         return f"{deviation:.1e}"
-    return f"{deviation:.1e}: {_explained(one, tool)}"
+    return f"{deviation:.1e}: {_explained(file, tool)}"
 
 
-def _explained(one: Mapping[str, Any], tool: str) -> str:
+def _explained(file: Mapping[str, Any], tool: str) -> str:
     why = [
         text
         for (part, other), text in EXPLANATIONS.items()
-        if other == tool and part in one["path"]
+        if other == tool and part in file["path"]
     ]
     return why[0] if why else "**not explained**"
 
 
 def _not_running(*kinds: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Numbers of archives and FMUs that do not run, by reason."""
-    counts = [Counter(_reason(one) for one in files if one["outcome"] != "runs") for files in kinds]
+    counts = [
+        Counter(_reason(file) for file in files if file["outcome"] != "runs") for files in kinds
+    ]
     yield "\n## What does not run\n\n| reason | archives | FMUs |\n| --- | --: | --: |"
     for reason in _REASONS:
         if any(count[reason] for count in counts):
             yield f"| {reason} | {' | '.join(str(count[reason]) for count in counts)} |"
 
 
-def _reason(one: Mapping[str, Any]) -> str:
-    return next(name for name, part in _REASONS.items() if re.search(part, one["reason"]))
+def _reason(file: Mapping[str, Any]) -> str:
+    return next(name for name, part in _REASONS.items() if re.search(part, file["reason"]))
 
 
 def _fmus(there: Sequence[Mapping[str, Any]]) -> Iterator[str]:
-    running = [one for one in there if one["outcome"] == "runs"]
-    numbers = [one["deviation"] for one in running if isinstance(one["deviation"], float)]
+    running = [file for file in there if file["outcome"] == "runs"]
+    numbers = [file["deviation"] for file in running if isinstance(file["deviation"], float)]
     yield f"\n## FMUs one by one\n\n{len(running)} of {len(there)} run{_versions(there)}.\n"
     yield (
         f"{len(numbers)} have Real outputs that the plain host also reads. {_equal(numbers)} "
         f"agree bit for bit, {_within(numbers)} to {FMU_BOUND:g}.\n"
     )
-    for one in running:
-        if isinstance(one["deviation"], float) and not one["deviation"] <= FMU_BOUND:
-            yield f"- {_name(one)} deviates by {one['deviation']:.1e}: {_explained(one, _HOST)}."
+    for file in running:
+        if isinstance(file["deviation"], float) and not file["deviation"] <= FMU_BOUND:
+            yield f"- {_name(file)} deviates by {file['deviation']:.1e}: {_explained(file, _HOST)}."
 
 
 def _versions(fmus: Sequence[Mapping[str, Any]]) -> str:
     """Numbers of FMUs that run, by version of FMI."""
-    counts = Counter(one["fmi"] for one in fmus)
-    running = Counter(one["fmi"] for one in fmus if one["outcome"] == "runs")
-    said = (f"{running[fmi]} of {counts[fmi]} of FMI {fmi}" for fmi in sorted(running))
-    return ": " + ", ".join(said)
+    counts = Counter(file["fmi"] for file in fmus)
+    running = Counter(file["fmi"] for file in fmus if file["outcome"] == "runs")
+    shares = (f"{running[fmi]} of {counts[fmi]} of FMI {fmi}" for fmi in sorted(running))
+    return ": " + ", ".join(shares)
 
 
 def _equal(numbers: Iterable[float]) -> int:
@@ -182,10 +184,10 @@ def _within(numbers: Iterable[float]) -> int:
 
 def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Results with other values of all Real parameters."""
-    changed = [one for one in fmus if "changed" in one and one["changed"].get("wanted") != 0]
-    ran = [one for one in changed if one["changed"]["outcome"] == "runs"]
-    lost = [one for one in ran if one["changed"]["lost"]]
-    silent = [one for one in lost if one["changed"]["silent"]]
+    changed = [file for file in fmus if "changed" in file and file["changed"].get("wanted") != 0]
+    ran = [file for file in changed if file["changed"]["outcome"] == "runs"]
+    lost = [file for file in ran if file["changed"]["lost"]]
+    silent = [file for file in lost if file["changed"]["silent"]]
     yield (
         f"\n## Parameters\n\n{len(changed)} of the FMUs that run have Real parameters. All "
         "parameters of an FMU were changed at once, by a hundredth, and read back after "
@@ -196,28 +198,28 @@ def _parameters(fmus: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         f"| that do not, silently | {len(silent)} |\n"
         f"| that do not run with these values | {len(changed) - len(ran)} |\n"
     )
-    numbers = [one["changed"].get("deviation") for one in ran]
+    numbers = [file["changed"].get("deviation") for file in ran]
     compared = [number for number in numbers if isinstance(number, float)]
     yield (
         f"{_within(compared)} of {len(compared)} with Real outputs agree to {FMU_BOUND:g} with the "
         "plain host, which sets the same values.\n"
     )
-    for one in ran:
-        deviation = one["changed"].get("deviation")
+    for file in ran:
+        deviation = file["changed"].get("deviation")
         if isinstance(deviation, float) and not deviation <= FMU_BOUND:
-            yield f"- {_name(one)} deviates by {deviation:.1e}: {_explained(one, _HOST)}."
+            yield f"- {_name(file)} deviates by {deviation:.1e}: {_explained(file, _HOST)}."
 
 
-def _name(one: Mapping[str, Any]) -> str:
+def _name(file: Mapping[str, Any]) -> str:
     """Source of a file, and its number of copies."""
-    more = f" ({one['copies']} more)" if one["copies"] else ""
-    return f"{one['place']}: {_cell(one['path'])}{more}"
+    more = f" ({file['copies']} more)" if file["copies"] else ""
+    return f"{file['place']}: {_cell(file['path'])}{more}"
 
 
-def _why(one: Mapping[str, Any]) -> str:
+def _why(file: Mapping[str, Any]) -> str:
     # A single FMU has the name of its file.
-    reason = re.sub(r"^fmu: (\S+\.fmu )?", "", one["reason"])
-    return f"{_OUTCOMES[one['outcome']]}: {_cell(reason)}"
+    reason = re.sub(r"^fmu: (\S+\.fmu )?", "", file["reason"])
+    return f"{_OUTCOMES[file['outcome']]}: {_cell(reason)}"
 
 
 def _cell(text: str) -> str:

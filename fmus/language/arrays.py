@@ -34,21 +34,25 @@ def binary(
     functions: Functions, operator: ast.operator, left: Expression, right: Expression
 ) -> Expression | None:
     """Return a sum, a difference, a product or a quotient; None if Python defines none."""
-    one, other = left.type, right.type
-    if isinstance(operator, (ast.Add, ast.Sub)) and one == other and is_algebraic(one):
+    left_type, right_type = left.type, right.type
+    if (
+        isinstance(operator, (ast.Add, ast.Sub))
+        and left_type == right_type
+        and is_algebraic(left_type)
+    ):
         name, sign = (
             ("plus", tree.ADD) if isinstance(operator, ast.Add) else ("minus", tree.SUBTRACT)
         )
-        return Call(_each(functions, name, sign, one, other), (left, right))
+        return Call(_each(functions, name, sign, left_type, right_type), (left, right))
     if isinstance(operator, ast.MatMult):
         return _product(functions, left, right)
     if isinstance(operator, ast.Mult):
-        array, number = (left, right) if is_algebraic(one) else (right, left)
+        array, number = (left, right) if is_algebraic(left_type) else (right, left)
         if is_algebraic(array.type) and is_number(number.type):
             function = _each(functions, "times", tree.MULTIPLY, array.type, FLOAT)
             return Call(function, (array, number))
-    if isinstance(operator, ast.Div) and is_algebraic(one) and is_number(other):
-        return Call(_each(functions, "over", tree.DIVIDE, one, FLOAT), (left, right))
+    if isinstance(operator, ast.Div) and is_algebraic(left_type) and is_number(right_type):
+        return Call(_each(functions, "over", tree.DIVIDE, left_type, FLOAT), (left, right))
     return None
 
 
@@ -77,10 +81,10 @@ def _each(functions: Functions, name: str, operator: tree.Operator, *types: Type
 
 def _at(name: str, type_: Type, places: Sequence[Expression]) -> Expression:
     """Return an element of an argument."""
-    found: Expression = Local(name, type_)
+    element: Expression = Local(name, type_)
     for place in places:
-        found = Item(found, place)
-    return found
+        element = Item(element, place)
+    return element
 
 
 def _loops(counters: Sequence[Local], n: Sequence[int], inner: Statement) -> Sequence[Statement]:
@@ -92,10 +96,13 @@ def _loops(counters: Sequence[Local], n: Sequence[int], inner: Statement) -> Seq
 
 
 def _product(functions: Functions, left: Expression, right: Expression) -> Expression | None:
-    one, other = left.type, right.type
-    if not (is_algebraic(one) and is_algebraic(other)) or sizes(one)[-1] != sizes(other)[0]:
+    left_type, right_type = left.type, right.type
+    if (
+        not (is_algebraic(left_type) and is_algebraic(right_type))
+        or sizes(left_type)[-1] != sizes(right_type)[0]
+    ):
         return None
-    rows, columns = sizes(one)[:-1], sizes(other)[1:]
+    rows, columns = sizes(left_type)[:-1], sizes(right_type)[1:]
     if columns and not rows:
         return None  # a row vector is not a Vector
     returns: Type = FLOAT
@@ -108,12 +115,12 @@ def _product(functions: Functions, left: Expression, right: Expression) -> Expre
         i, j = ([Local(letter, INT)] if n else [] for letter, n in (("i", rows), ("j", columns)))
         k, total = Local("k", INT), Local("total", FLOAT)
         term = tree.Operation(
-            tree.MULTIPLY, (_at("a", one, [*i, k]), _at("b", other, [k, *j])), FLOAT
+            tree.MULTIPLY, (_at("a", left_type, [*i, k]), _at("b", right_type, [k, *j])), FLOAT
         )
         add = tree.Store([("total", tree.Operation(tree.ADD, (total, term), FLOAT))])
         sum_: list[Statement] = [
             tree.Store([("total", tree.Number(0.0, FLOAT))]),
-            *_loops([k], sizes(other)[:1], add),
+            *_loops([k], sizes(right_type)[:1], add),
         ]
         if not rows:
             return [*sum_, tree.Return(total)]
@@ -126,7 +133,9 @@ def _product(functions: Functions, left: Expression, right: Expression) -> Expre
         return [tree.Reserve("c", returns), outer, tree.Return(Local("c", returns))]
 
     name = "product_at" if by_address else "product"
-    function = functions.helper(name, (one, other), {"a": one, "b": other}, returns, body)
+    function = functions.helper(
+        name, (left_type, right_type), {"a": left_type, "b": right_type}, returns, body
+    )
     function.by_address = by_address
     return Call(function, (left, right))
 
@@ -213,10 +222,10 @@ def extreme(functions: Functions, word: str, operand: Expression) -> Expression:
     return Call(function, (operand,))
 
 
-def extreme_of_two(word: str, one: Expression, other: Expression) -> Expression:
+def extreme_of_two(word: str, first: Expression, second: Expression) -> Expression:
     """Return the smaller or the larger of two numbers of one type; the first if they are equal."""
     operators = {
         ("min", True): tree.MIN, ("max", True): tree.MAX,
         ("min", False): tree.INT_MIN, ("max", False): tree.INT_MAX,
     }  # fmt: skip
-    return tree.Operation(operators[word, one.type == FLOAT], (one, other), one.type)
+    return tree.Operation(operators[word, first.type == FLOAT], (first, second), first.type)

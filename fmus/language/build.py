@@ -181,9 +181,9 @@ class Program:
 
     def refuse(self, place: str, what: str) -> None:
         """Note a mistake; only the first one of each line, since others follow from it."""
-        found = PLACED.match(what)
-        if found:
-            place, what = found[0], what[found.end() :]
+        match = PLACED.match(what)
+        if match:
+            place, what = match[0], what[match.end() :]
         self._mistakes.setdefault(place, what)
 
     def function(self, function: FunctionType, types: Sequence[Type] = ()) -> Function:
@@ -226,8 +226,8 @@ def _message_of(error: Exception) -> str:
 
 def position(mistake: str) -> tuple[str, int]:
     """Return the file and line of a mistake; a mistake without them comes first."""
-    found = PLACED.match(mistake)
-    file, _, number = found[0][:-2].rpartition(":") if found else ("", "", "0")
+    match = PLACED.match(mistake)
+    file, _, number = match[0][:-2].rpartition(":") if match else ("", "", "0")
     return file, int(number)
 
 
@@ -238,8 +238,10 @@ def _module(path: str) -> ast.Module:
 
 def _definition(path: str, line: int) -> ast.FunctionDef | None:
     """Return the function that begins at a line of a module."""
-    found = (n for n in _module(path).body if isinstance(n, ast.FunctionDef) and n.lineno == line)
-    return next(found, None)
+    functions = (
+        n for n in _module(path).body if isinstance(n, ast.FunctionDef) and n.lineno == line
+    )
+    return next(functions, None)
 
 
 @cache
@@ -268,15 +270,15 @@ def _is_included(function: FunctionType, path: str, module: str) -> bool:
 
 def _stored(*nodes: ast.AST) -> list[str]:
     """Return the names that nodes assign, not in nested functions and expressions with `for`."""
-    found: list[str] = []
+    names: list[str] = []
     for node in nodes:
         if isinstance(node, ast.FunctionDef):
-            found.append(node.name)
+            names.append(node.name)
         elif isinstance(node, ast.Name):
-            found += [node.id] if isinstance(node.ctx, ast.Store) else []
+            names += [node.id] if isinstance(node.ctx, ast.Store) else []
         elif not isinstance(node, ast.GeneratorExp):
-            found += _stored(*ast.iter_child_nodes(node))
-    return found
+            names += _stored(*ast.iter_child_nodes(node))
+    return names
 
 
 def _names(node: ast.AST) -> set[str]:
@@ -285,23 +287,23 @@ def _names(node: ast.AST) -> set[str]:
 
 def _free(*nodes: ast.AST) -> list[str]:
     """Return the names that nodes use and do not define themselves, in the order of use."""
-    found: list[str] = []
+    names: list[str] = []
     for node in nodes:
         if isinstance(node, ast.Name):
-            found += [node.id] if isinstance(node.ctx, ast.Load) else []
+            names += [node.id] if isinstance(node.ctx, ast.Load) else []
         elif isinstance(node, ast.FunctionDef):
             own = _own(node)
-            found += _free(*node.args.defaults, *filter(None, node.args.kw_defaults))
-            found += [name for name in _free(*node.body) if name not in own]
+            names += _free(*node.args.defaults, *filter(None, node.args.kw_defaults))
+            names += [name for name in _free(*node.body) if name not in own]
         elif isinstance(node, ast.GeneratorExp):
             generator, own = node.generators[0], _names(node.generators[0].target)
             inner = _free(node.elt, *generator.ifs)
-            found += [*_free(generator.iter), *(name for name in inner if name not in own)]
+            names += [*_free(generator.iter), *(name for name in inner if name not in own)]
         elif isinstance(node, ast.AnnAssign):
-            found += _free(*filter(None, [node.value]))
+            names += _free(*filter(None, [node.value]))
         else:
-            found += _free(*ast.iter_child_nodes(node))
-    return found
+            names += _free(*ast.iter_child_nodes(node))
+    return names
 
 
 def _arguments(node: ast.FunctionDef) -> list[ast.arg]:
@@ -320,15 +322,15 @@ def _is_none(node: ast.expr | None) -> bool:
 
 def _beyond_loops(*nodes: ast.AST) -> set[str]:
     """Return the names that occur outside of the loops that assign them."""
-    found: set[str] = set()
+    names: set[str] = set()
     for node in nodes:
         if isinstance(node, ast.For):
-            found |= {*_free(node.iter)} | _beyond_loops(*node.body) - _names(node.target)
+            names |= {*_free(node.iter)} | _beyond_loops(*node.body) - _names(node.target)
         elif isinstance(node, (ast.FunctionDef, ast.expr)):
-            found |= {*_free(node), *_stored(node)}
+            names |= {*_free(node), *_stored(node)}
         else:
-            found |= _beyond_loops(*ast.iter_child_nodes(node))
-    return found
+            names |= _beyond_loops(*ast.iter_child_nodes(node))
+    return names
 
 
 class _Loop(NamedTuple):
@@ -540,26 +542,26 @@ class _Builder:
     # Blocks
 
     def _block(self, nodes: Sequence[ast.stmt]) -> list[Statement]:
-        found: list[Statement] = []
+        statements: list[Statement] = []
         self._blocks += 1
         for node in nodes:
             if self.known is None:
                 break  # unreachable
-            before = len(found)
-            self._before = found
+            before = len(statements)
+            self._before = statements
             with _Noting(self, node):
-                self._statement(node, found)
+                self._statement(node, statements)
             self._before = None
             about = _comments(self.path).get(node.end_lineno or 0)
             is_simple = not isinstance(
                 node, (ast.If, ast.While, ast.For, ast.FunctionDef, ast.Match)
             )
-            if about and is_simple and len(found) > before:
-                found[-1].comment = about
+            if about and is_simple and len(statements) > before:
+                statements[-1].comment = about
         self._blocks -= 1
-        return found
+        return statements
 
-    def _statement(self, node: ast.stmt, found: list[Statement]) -> None:
+    def _statement(self, node: ast.stmt, statements: list[Statement]) -> None:
         name = f"_{type(node).__name__.lower()}_statement"
         is_branched = isinstance(node, (ast.If, ast.Match))
         if is_branched and self._blocks + len(getattr(node, "cases", ())) > _MOST_BLOCKS:
@@ -567,20 +569,20 @@ class _Builder:
             raise _Outside(node, what)
         if not hasattr(self, name):
             raise self._cannot(node, word_of(node))
-        getattr(self, name)(node, found)
+        getattr(self, name)(node, statements)
 
-    def _pass_statement(self, node: ast.Pass, found: list[Statement]) -> None:
+    def _pass_statement(self, node: ast.Pass, statements: list[Statement]) -> None:
         """Add no statement."""
 
-    def _expr_statement(self, node: ast.Expr, found: list[Statement]) -> None:
+    def _expr_statement(self, node: ast.Expr, statements: list[Statement]) -> None:
         if isinstance(getattr(node.value, "value", None), str):
             return  # as docstrings are
         if not isinstance(node.value, ast.Call):
             is_word = isinstance(node.value, (ast.Await, ast.Yield, ast.YieldFrom))
             raise self._cannot(node, word_of(node.value if is_word else node))
-        found.append(tree.Do(self.expression(node.value, NOTHING)))
+        statements.append(tree.Do(self.expression(node.value, NOTHING)))
 
-    def _return_statement(self, node: ast.Return, found: list[Statement]) -> None:
+    def _return_statement(self, node: ast.Return, statements: list[Statement]) -> None:
         assert self.node is not None
         name, value = self.node.name, None
         try:
@@ -593,18 +595,18 @@ class _Builder:
                 self._returns = self._returns or value.type
         finally:
             self.known = None
-        found.append(tree.Return(value))
+        statements.append(tree.Return(value))
 
-    def _break_statement(self, node: ast.Break, found: list[Statement]) -> None:
+    def _break_statement(self, node: ast.Break, statements: list[Statement]) -> None:
         self._ends[-1] = _both(self._ends[-1], self.known)
         self.known = None
-        found.append(tree.Break())
+        statements.append(tree.Break())
 
-    def _continue_statement(self, node: ast.Continue, found: list[Statement]) -> None:
+    def _continue_statement(self, node: ast.Continue, statements: list[Statement]) -> None:
         self.known = None
-        found.append(tree.Continue())
+        statements.append(tree.Continue())
 
-    def _if_statement(self, node: ast.If, found: list[Statement]) -> None:
+    def _if_statement(self, node: ast.If, statements: list[Statement]) -> None:
         test: Expression = Number(True, BOOL)
         with _Noting(self):
             test = self.condition(node.test)
@@ -613,18 +615,18 @@ class _Builder:
         after, self.known = self.known, before
         orelse = self._block(node.orelse)
         self.known = _both(after, self.known)
-        found.append(tree.If(test, body, orelse))
+        statements.append(tree.If(test, body, orelse))
 
-    def _assert_statement(self, node: ast.Assert, found: list[Statement]) -> None:
+    def _assert_statement(self, node: ast.Assert, statements: list[Statement]) -> None:
         test = Operation(tree.NOT, (self.condition(node.test),), BOOL)
         # The text is evaluated only if the condition does not hold.
         self._before = None
         parts: list[str | tuple[Expression, str]] = ["AssertionError: "]
         if node.msg is not None:
             parts += self._message(node.msg)
-        found.append(tree.If(test, [tree.Raise(parts)]))
+        statements.append(tree.If(test, [tree.Raise(parts)]))
 
-    def _match_statement(self, node: ast.Match, found: list[Statement]) -> None:
+    def _match_statement(self, node: ast.Match, statements: list[Statement]) -> None:
         subject = self._held(self.expression(node.subject), "case")
         if not is_whole(subject.type):
             raise _Outside(node, f"match of {subject.type.word}: it takes an int or an enumeration")
@@ -653,15 +655,15 @@ class _Builder:
         orelse: Sequence[Statement] = ()
         for test, body in reversed(tests):
             orelse = body if test is None else [tree.If(test, body, orelse)]
-        found += orelse
+        statements += orelse
 
     def _cases(self, pattern: ast.pattern) -> list[Expression]:
         """Return the values of a case; empty for the default case."""
         if isinstance(pattern, ast.MatchAs) and pattern.pattern is None and pattern.name is None:
             return []
         if isinstance(pattern, ast.MatchOr):
-            found = [self._cases(one) for one in pattern.patterns]
-            return [value for values in found for value in values] if all(found) else []
+            cases = [self._cases(alternative) for alternative in pattern.patterns]
+            return [value for values in cases for value in values] if all(cases) else []
         if isinstance(pattern, ast.MatchValue):
             value = self.expression(pattern.value)
             if is_whole(value.type):
@@ -672,7 +674,7 @@ class _Builder:
         tests = [Operation(tree.EQUAL, (subject, value), BOOL) for value in values]
         return tests[0] if len(tests) == 1 else Operation(tree.OR, tests, BOOL)
 
-    def _while_statement(self, node: ast.While, found: list[Statement]) -> None:
+    def _while_statement(self, node: ast.While, statements: list[Statement]) -> None:
         if node.orelse:
             raise self._cannot(node.orelse[0], "else of a while")
         is_endless = isinstance(node.test, ast.Constant) and node.test.value == 1
@@ -691,9 +693,9 @@ class _Builder:
         body = self._block(node.body)
         end = self._ends.pop()
         self.known = end if is_endless else before
-        found.append(tree.While(test, body))
+        statements.append(tree.While(test, body))
 
-    def _for_statement(self, node: ast.For, found: list[Statement]) -> None:
+    def _for_statement(self, node: ast.For, statements: list[Statement]) -> None:
         if node.orelse:
             raise self._cannot(node.orelse[0], "else of a for")
         self._check_target(node.target)
@@ -727,7 +729,7 @@ class _Builder:
             after = {name: inside[name] for name, _ in loop.bound if name in self._beyond_loops}
             self.known = {**before, **after}
             self.known = self.known if loop.turns else _both(before, self.known)
-        found.append(loop.made([*stores, *body]))
+        statements.append(loop.made([*stores, *body]))
 
     def _turn(
         self, node: ast.For | ast.comprehension, loop: _Loop, used: Set[str]
@@ -746,7 +748,7 @@ class _Builder:
 
     # Nested functions
 
-    def _functiondef_statement(self, node: ast.FunctionDef, found: list[Statement]) -> None:
+    def _functiondef_statement(self, node: ast.FunctionDef, statements: list[Statement]) -> None:
         if self._counts[node.name] > (node.name not in self.made.arguments):
             raise _Outside(node, f"{node.name} is given a value twice: use two names")
         own = _own(node)
@@ -763,7 +765,7 @@ class _Builder:
         types = {name: inner.made.arguments[name] for name in names}
         n = len(names) - len(given.kwonlyargs)
         defaults = [*zip(names[n - len(given.defaults) : n], given.defaults)]
-        defaults += [(name, one) for name, one in zip(names[n:], given.kw_defaults) if one]
+        defaults += [(name, value) for name, value in zip(names[n:], given.kw_defaults) if value]
         values = {}
         for name, default in defaults:
             value = self._sometimes(partial(self.fitting, wanted=types[name]), default)
@@ -780,11 +782,11 @@ class _Builder:
         self._check_functions(names)
         captured = {name: called.captured for name, called in self.functions.items()}
         used = [n for name in names for n in (name, *captured.get(name, ()))]
-        found = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
-        for name in found:
+        needed = [n for n in dict.fromkeys(used) if n in self.names and n not in self.functions]
+        for name in needed:
             if name in own:
                 raise _Outside(node, f"{name} has two meanings here: rename one")
-        return found
+        return needed
 
     def _check_functions(self, names: Sequence[str]) -> None:
         """Refuse local functions that may be undefined."""
@@ -809,31 +811,31 @@ class _Builder:
 
     # Assignments
 
-    def _assign_statement(self, node: ast.Assign, found: list[Statement]) -> None:
+    def _assign_statement(self, node: ast.Assign, statements: list[Statement]) -> None:
         for target in node.targets:
             self._check_target(target)
         value: ast.expr = node.value
         if len(node.targets) == 1:
-            self._assign(node.targets[0], value, found)
+            self._assign(node.targets[0], value, statements)
             return
         held = self._kept(self.expression(value), "all")
         for target in node.targets:
-            found += self._take_apart(target, held)
+            statements += self._take_apart(target, held)
 
-    def _annassign_statement(self, node: ast.AnnAssign, found: list[Statement]) -> None:
+    def _annassign_statement(self, node: ast.AnnAssign, statements: list[Statement]) -> None:
         self._check_target(node.target)
         assert isinstance(node.target, ast.Name)
         if node.value is None:
             raise self._cannot(node, word_of(node))
         type_ = self._hinted(node, node.annotation, node.target.id)
-        found.append(self._store(node, [(node.target.id, self.fitting(node.value, type_))]))
+        statements.append(self._store(node, [(node.target.id, self.fitting(node.value, type_))]))
 
-    def _augassign_statement(self, node: ast.AugAssign, found: list[Statement]) -> None:
+    def _augassign_statement(self, node: ast.AugAssign, statements: list[Statement]) -> None:
         self._check_target(node.target)
         assert isinstance(node.target, ast.Name)
         target = ast.copy_location(ast.Name(node.target.id, ast.Load()), node)
         changed = ast.copy_location(ast.BinOp(target, node.op, node.value), node)
-        found.append(self._store(node, [(target.id, self.expression(changed))]))
+        statements.append(self._store(node, [(target.id, self.expression(changed))]))
 
     def _check_target(self, node: ast.expr) -> None:
         if isinstance(node, (ast.Tuple, ast.List)):
@@ -850,40 +852,40 @@ class _Builder:
             what = f"{word_of(node)} of a matrix" if is_of_matrix else word_of(node)
             raise self._cannot(node, f"an assignment to {what}")
 
-    def _assign(self, target: ast.expr, value: ast.expr, found: list[Statement]) -> None:
+    def _assign(self, target: ast.expr, value: ast.expr, statements: list[Statement]) -> None:
         if isinstance(target, ast.Name) and target.id == "_":
-            found.append(tree.Do(self.expression(value)))
+            statements.append(tree.Do(self.expression(value)))
         elif isinstance(target, ast.Name) and (change := self._change_of(target, value)):
-            found.append(change)
+            statements.append(change)
         elif isinstance(target, ast.Name):
             wanted = (self.known or {}).get(target.id)
-            found.append(self._store(target, [(target.id, self.expression(value, wanted))]))
+            statements.append(self._store(target, [(target.id, self.expression(value, wanted))]))
         elif (
             isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
             and len(target.elts) == len(value.elts)
-            and not any(isinstance(one, ast.Starred) for one in value.elts)
+            and not any(isinstance(element, ast.Starred) for element in value.elts)
         ):  # fmt: skip
             pairs = [*zip(target.elts, value.elts)]
             if _names(target) & _names(value):
                 # All values are computed before the first is stored.
                 values = [
-                    self._kept(self.expression(one), f"next_{i}")
-                    for i, (_, one) in enumerate(pairs)
+                    self._kept(self.expression(element), f"next_{i}")
+                    for i, (_, element) in enumerate(pairs)
                 ]
-                for (one, _), held in zip(pairs, values):
-                    found += self._take_apart(one, held)
-            elif all(isinstance(one, ast.Name) and one.id != "_" for one, _ in pairs):
-                made = [(ast.unparse(one), self.expression(other)) for one, other in pairs]
-                found.append(self._store(target, made))
+                for (element, _), held in zip(pairs, values):
+                    statements += self._take_apart(element, held)
+            elif all(isinstance(name, ast.Name) and name.id != "_" for name, _ in pairs):
+                made = [(ast.unparse(name), self.expression(element)) for name, element in pairs]
+                statements.append(self._store(target, made))
             else:
-                for one, other in pairs:
-                    self._assign(one, other, found)
+                for name, element in pairs:
+                    self._assign(name, element, statements)
         else:
             made_of = self.expression(value)
             # Store the value if an assignment could change parts that are read later.
             if not _is_fixed(made_of) or _names(target) & _names(value):
                 made_of = self._kept(made_of, self._name_of_all(target, value))
-            found += self._take_apart(target, made_of)
+            statements += self._take_apart(target, made_of)
 
     def _change_of(self, target: ast.Name, value: ast.expr) -> Statement | None:
         """Return the change of an element if the assignment only replaces one: it needs no copy."""
@@ -923,8 +925,8 @@ class _Builder:
         parts = self._parts_of(target, value)
         if len(parts) != len(target.elts):
             raise _Outside(target, f"{len(target.elts)} names for {len(parts)} values")
-        for one, part in zip(target.elts, parts):
-            yield from self._taken_apart(one, part)
+        for name, part in zip(target.elts, parts):
+            yield from self._taken_apart(name, part)
 
     def _parts_of(self, node: ast.AST, value: Expression) -> list[Expression]:
         """Return the elements of a value."""
@@ -976,9 +978,9 @@ class _Builder:
     def _unused(self, name: str) -> str:
         """Return a new name for the tree."""
         names = chain([name], (f"{name}_{number}" for number in count(2)))
-        found = next(n for n in names if n not in self._taken)
-        self._taken.add(found)
-        return found
+        free = next(n for n in names if n not in self._taken)
+        self._taken.add(free)
+        return free
 
     def _held(self, value: Expression, name: str) -> Expression:
         """Return a value that may be used several times: a variable, if it must be computed."""
@@ -988,15 +990,15 @@ class _Builder:
         """Store a value in a new variable."""
         if self._before is None:
             raise _Outside(ast.Pass(), "this is computed only in some cases: give it a name before")
-        found = self._unused(name)
-        self._before.append(tree.Store([(found, value)]))
-        return Local(found, value.type)
+        local = self._unused(name)
+        self._before.append(tree.Store([(local, value)]))
+        return Local(local, value.type)
 
     # Exceptions that a component raises
 
-    def _raise_statement(self, node: ast.Raise, found: list[Statement]) -> None:
+    def _raise_statement(self, node: ast.Raise, statements: list[Statement]) -> None:
         try:
-            found.append(self._raised(node, node.exc))
+            statements.append(self._raised(node, node.exc))
         finally:
             self.known = None
 
@@ -1008,8 +1010,8 @@ class _Builder:
         kind = self._global_value(call.func)
         is_known = is_class(kind, BaseException) and issubclass(kind, _EXCEPTIONS)
         changed = [
-            value for one in getattr(kind, "__mro__", ()) if one is not Refusal
-            for value in vars(one).values() if isinstance(value, FunctionType)
+            value for base in getattr(kind, "__mro__", ()) if base is not Refusal
+            for value in vars(base).values() if isinstance(value, FunctionType)
         ]  # fmt: skip
         if not is_known or changed or kind.__str__ is not BaseException.__str__:
             what = ast.unparse(call.func)
@@ -1023,13 +1025,13 @@ class _Builder:
             if not (isinstance(text, ast.Constant) and isinstance(text.value, str)):
                 raise self._cannot(text, "a raise without a text")
             text = ast.copy_location(ast.JoinedStr([text]), text)
-        found: list[Any] = []
+        parts: list[Any] = []
         for part in text.values:
             if isinstance(part, ast.FormattedValue):
-                found.append(self._formatted(part))
+                parts.append(self._formatted(part))
             else:
-                found.append(_text(ast.literal_eval(part)).value)
-        return found
+                parts.append(_text(ast.literal_eval(part)).value)
+        return parts
 
     def _formatted(self, part: ast.FormattedValue) -> tuple[Expression, str]:
         """Return a value in a message, and its format."""
@@ -1134,9 +1136,9 @@ class _Builder:
         hold: _Hold,
     ) -> tuple[list[tuple[str, Expression]], int]:
         """Return the names and values of `zip` and `enumerate`."""
-        starts = [one for one in call.keywords if called is enumerate and one.arg == "start"]
-        given = [*call.args, *(one.value for one in starts)]
-        others = [one for one in call.keywords if one not in starts]
+        starts = [named for named in call.keywords if called is enumerate and named.arg == "start"]
+        given = [*call.args, *(named.value for named in starts)]
+        others = [named for named in call.keywords if named not in starts]
         self._check_plain(ast.copy_location(ast.Call(call.func, given, others), call),
                           called.__name__)  # fmt: skip
         if not isinstance(target, ast.Tuple):
@@ -1146,7 +1148,7 @@ class _Builder:
             if len(names) != len(given) or not given:
                 raise _Outside(target, "another number of names than zip has parts")
             pairs = [self._items(t, i, place, hold) for t, i in zip(names, given)]
-            return [one for bound, _ in pairs for one in bound], min(n for _, n in pairs)
+            return [binding for bound, _ in pairs for binding in bound], min(n for _, n in pairs)
         if len(names) != 2 or not 1 <= len(given) <= 2:
             raise _Outside(target, "enumerate of other than two names, and a start")
         first = self._size(given[1]) if given[1:] else 0
@@ -1168,7 +1170,7 @@ class _Builder:
         if self._depth > _DEEPEST:
             raise _Outside(node, f"an expression of {_DEEPEST} levels: take it apart")
         try:
-            found: Expression = getattr(self, name)(node, wanted)
+            expression: Expression = getattr(self, name)(node, wanted)
         except (_Outside, _Follows) as error:
             if isinstance(error, _Outside) and not hasattr(error.node, "lineno"):
                 error.node = node
@@ -1177,11 +1179,11 @@ class _Builder:
             raise _Outside(node, _message_of(error)) from None
         finally:
             self._depth -= 1
-        if found.type == UNKNOWN:
+        if expression.type == UNKNOWN:
             raise _Follows
-        if found.type == NOTHING != wanted:
+        if expression.type == NOTHING != wanted:
             raise _Outside(node, "what returns nothing is used as a value")
-        return found
+        return expression
 
     def fitting(self, node: ast.expr, wanted: Type | None) -> Expression:
         """Return an expression of exactly this type."""
@@ -1261,18 +1263,18 @@ class _Builder:
             operand = self._folded(node.operand)
             return None if operand is None else -operand
         if isinstance(node, ast.BinOp) and type(node.op) in _FOLDED:
-            one, other = self._folded(node.left), self._folded(node.right)
-            if one is None or other is None:
+            left, right = self._folded(node.left), self._folded(node.right)
+            if left is None or right is None:
                 return None
             with suppress(ArithmeticError):
-                return _FOLDED[type(node.op)](one, other)
+                return _FOLDED[type(node.op)](left, right)
             return None
         if (
             isinstance(node, ast.Call) and self._global_value(node.func) is len
-            and not any(isinstance(one, ast.Call) for x in node.args for one in ast.walk(x))
+            and not any(isinstance(part, ast.Call) for x in node.args for part in ast.walk(x))
         ):  # fmt: skip
-            found = self.expression(node)
-            return int(found.value) if isinstance(found, Number) else None
+            size = self.expression(node)
+            return int(size.value) if isinstance(size, Number) else None
         value = node.value if isinstance(node, ast.Constant) else self._global_value(node)
         return value if type(value) in (int, float) else None  # type: ignore[return-value]
 
@@ -1323,7 +1325,7 @@ class _Builder:
             raise _Outside(node, f"{what} is not a value: name a part of it")
         if callable(value):
             raise self._cannot(node, f"the name {ast.unparse(node)}")
-        if any(value is getattr(math, one) for one in CONSTANTS):
+        if any(value is getattr(math, constant) for constant in CONSTANTS):
             return Number(value, FLOAT)
         owner = self._global_value(node.value) if isinstance(node, ast.Attribute) else None
         module = owner.__name__ if isinstance(owner, ModuleType) else self.scope["__name__"]
@@ -1441,7 +1443,7 @@ class _Builder:
             if isinstance(node, ast.Starred):
                 parts = self._unpacked(node.value)
                 wanted = [*types[len(values) :], *[None] * len(parts)]
-                values += [self._fit(node, *one) for one in zip(parts, wanted)]
+                values += [self._fit(node, *pair) for pair in zip(parts, wanted)]
             else:
                 wanted = [*types[len(values) :], None]
                 values.append(make(node, wanted[0]))
@@ -1493,8 +1495,8 @@ class _Builder:
 
     def _of_arrays(self, node: ast.BinOp, left: Expression, right: Expression) -> Expression:
         operands = [
-            self._number(one, value) if is_number(value.type) else value
-            for one, value in ((node.left, left), (node.right, right))
+            self._number(side, value) if is_number(value.type) else value
+            for side, value in ((node.left, left), (node.right, right))
         ]
         found = arrays.binary(self.program.functions, node.op, operands[0], operands[1])
         if found is None:
@@ -1536,11 +1538,11 @@ class _Builder:
         return value
 
     def _boolop(self, node: ast.BoolOp, wanted: Type | None) -> Expression:
-        def of_bool(one: ast.expr) -> Expression:
-            value = self.expression(one)
+        def of_bool(operand: ast.expr) -> Expression:
+            value = self.expression(operand)
             if value.type != BOOL:
                 what = f"{value.type.word} before or after and, or: write a comparison"
-                raise _Outside(one, what)
+                raise _Outside(operand, what)
             return value
 
         return self._joined(node, of_bool)
@@ -1553,33 +1555,38 @@ class _Builder:
     def _compare(self, node: ast.Compare, wanted: Type | None) -> Expression:
         nodes = [node.left, *node.comparators]
         values = [self.expression(nodes[0]), self.expression(nodes[1])]
-        values += [self._sometimes(self.expression, one) for one in nodes[2:]]
+        values += [self._sometimes(self.expression, operand) for operand in nodes[2:]]
         parts = []
-        for op, left, right, one, other in zip(node.ops, nodes, nodes[1:], values, values[1:]):
+        for op, left, right, left_value, right_value in zip(
+            node.ops, nodes, nodes[1:], values, values[1:]
+        ):
             if type(op) not in _COMPARISONS:
                 raise self._cannot(node, "a comparison other than of size")
-            for side, value in ((left, one), (right, other)):
+            for side, value in ((left, left_value), (right, right_value)):
                 if not is_number(value.type):
                     raise _Outside(side, f"a comparison of {value.type.word}")
-            if FLOAT in (one.type, other.type):
-                one, other = self._number(left, one), self._number(right, other)
-            parts.append(Operation(_COMPARISONS[type(op)], (one, other), BOOL))
+            if FLOAT in (left_value.type, right_value.type):
+                left_value, right_value = (
+                    self._number(left, left_value),
+                    self._number(right, right_value),
+                )
+            parts.append(Operation(_COMPARISONS[type(op)], (left_value, right_value), BOOL))
         return parts[0] if len(parts) == 1 else Operation(tree.AND, parts, BOOL)
 
     def _ifexp(self, node: ast.IfExp, wanted: Type | None) -> Expression:
         test = self.condition(node.test)
-        one, other = (
+        this, other = (
             self._sometimes(lambda side: self.expression(side, wanted), side)
             for side in (node.body, node.orelse)
         )
-        if FLOAT in (one.type, other.type):
-            one = self._fit(node.body, one, FLOAT)
+        if FLOAT in (this.type, other.type):
+            this = self._fit(node.body, this, FLOAT)
             other = self._fit(node.orelse, other, FLOAT)
-        elif one.type != other.type and INT in (one.type, other.type):
+        elif this.type != other.type and INT in (this.type, other.type):
             # A member of an enumeration is converted to the other value's type, int.
-            one, other = self._fit(node.body, one, INT), self._fit(node.orelse, other, INT)
-            return Choice(test, _as_int(one), _as_int(other))
-        return Choice(test, one, self._fit(node.orelse, other, one.type))
+            this, other = self._fit(node.body, this, INT), self._fit(node.orelse, other, INT)
+            return Choice(test, _as_int(this), _as_int(other))
+        return Choice(test, this, self._fit(node.orelse, other, this.type))
 
     # Calls
 
@@ -1670,13 +1677,15 @@ class _Builder:
             if not is_number(value.type):
                 raise _Outside(argument, f"{word} of {value.type.word}")
         if any(value.type == FLOAT for value in values):
-            values = [self._fit(one, value, FLOAT) for one, value in zip(node.args, values)]
+            values = [
+                self._fit(argument, value, FLOAT) for argument, value in zip(node.args, values)
+            ]
         elif any(value.type != values[0].type for value in values):
             values = [*map(_as_int, values)]
-        found = values[0]
+        extreme = values[0]
         for value in values[1:]:
-            found = arrays.extreme_of_two(word, found, value)
-        return found
+            extreme = arrays.extreme_of_two(word, extreme, value)
+        return extreme
 
     def _of_generator(self, node: ast.Call, word: str) -> Expression:
         self._check_plain(node, word, 1)
@@ -1769,9 +1778,9 @@ class _Builder:
         else:
             element = inner.expression(node.elt)
             check_size(f"a tuple of {turns}", turns)
-            one = tuple_of([element.type])
-            assert isinstance(one, Array)
-            type_ = replace(one, n=turns)
+            single = tuple_of([element.type])
+            assert isinstance(single, Array)
+            type_ = replace(single, n=turns)
         elements = Local(inner._unused("elements"), type_)
         before: list[Statement] = [tree.Reserve(elements.name, type_)]
         counts = _value(each.loop.start) == 0 and each.loop.step == 1
@@ -1808,10 +1817,10 @@ class _Builder:
             if each.block is not each.turn or not loop.turns:
                 raise _Outside(node, f"{word} of a number of values that is not a constant above 0")
             found = Local(inner._unused("found"), value.type)
-            one = Local(inner._unused("each"), value.type)
-            each.block.append(tree.Store([(one.name, value)]))
+            element = Local(inner._unused("each"), value.type)
+            each.block.append(tree.Store([(element.name, value)]))
             is_first = Operation(tree.EQUAL, (loop.counter, loop.start), BOOL)
-            next_ = Choice(is_first, one, arrays.extreme_of_two(word, found, one))
+            next_ = Choice(is_first, element, arrays.extreme_of_two(word, found, element))
         each.block.append(tree.Store([(found.name, next_)]))
         zero = Number(0.0, FLOAT) if found.type == FLOAT else int_of(0)
         return each.call([tree.Store([(found.name, zero)])], found)
@@ -1924,22 +1933,26 @@ class _Builder:
         with suppress(Exception):  # reported where it is translated
             hints = hints_of(called)
         parameters = inspect.signature(called).parameters.values()
-        unsized = [one.name for one in parameters if has_no_size(hints.get(one.name))]
+        unsized = [
+            parameter.name for parameter in parameters if has_no_size(hints.get(parameter.name))
+        ]
         if unsized:
             function = None
             types = {
-                one.name: None if one.name in unsized else type_of(hints[one.name])
-                for one in parameters
-                if one.name in hints
+                parameter.name: None
+                if parameter.name in unsized
+                else type_of(hints[parameter.name])
+                for parameter in parameters
+                if parameter.name in hints
             }
         else:
             function = self.program.function(called)
             types = {**function.arguments}
-        kinds = [one.kind for one in parameters]
+        kinds = [parameter.kind for parameter in parameters]
         takes = _Signature(
             called.__module__, called.__name__, types, kinds.count(Parameter.POSITIONAL_ONLY),
             len(kinds) - kinds.count(Parameter.KEYWORD_ONLY),
-            {one.name: one.default for one in parameters if one.default is not one.empty},
+            {x.name: x.default for x in parameters if x.default is not x.empty},
         )  # fmt: skip
         given = self._given(node, takes)
         for name in unsized:
@@ -2014,7 +2027,7 @@ class _Noting:
             error = _Outside(ast.Pass(), _TOO_DEEP)
         if isinstance(error, (_Outside, TypeError)):
             node = error.node if isinstance(error, _Outside) else self._node
-            places = (getattr(one, "lineno", 0) for one in (node, self._node, builder.node))
+            places = (getattr(origin, "lineno", 0) for origin in (node, self._node, builder.node))
             line = next(filter(None, places), 0)
             builder.program.refuse(f"{builder.path}:{line}: ", str(error))
             builder.has_mistakes = True
@@ -2025,13 +2038,13 @@ class _Noting:
         return True
 
 
-def _both(one: _Known | None, other: _Known | None) -> _Known | None:
+def _both(first: _Known | None, second: _Known | None) -> _Known | None:
     """Return the names known on both of two paths, with the same type; None if unreachable."""
-    if one is None or other is None:
-        return one if other is None else other
-    types = {name: {type_, other[name]} for name, type_ in one.items() if name in other}
+    if first is None or second is None:
+        return first if second is None else second
+    types = {name: {type_, second[name]} for name, type_ in first.items() if name in second}
     return {
-        name: UNKNOWN if UNKNOWN in both else one[name]
+        name: UNKNOWN if UNKNOWN in both else first[name]
         for name, both in types.items()
         if len(both) == 1 or UNKNOWN in both
     }
@@ -2052,21 +2065,21 @@ def _first_name(target: ast.expr) -> str:
 
 def _stem(name: str) -> str:
     """Return a name without leading underscores; empty if nothing remains."""
-    found = name.lstrip("_")
-    return found if found.isidentifier() else ""
+    bare = name.lstrip("_")
+    return bare if bare.isidentifier() else ""
 
 
-def _value(one: Expression) -> int | None:
+def _value(expression: Expression) -> int | None:
     """Return the value of a literal; None for other expressions."""
-    return one.value if isinstance(one, Number) else None
+    return expression.value if isinstance(expression, Number) else None
 
 
 def _count(first: int, place: Expression, step: int) -> Expression:
     """Return the number of a range at an index."""
-    found = place
+    offset = place
     if step != 1:
-        found = Operation(tree.COUNT_MULTIPLY, (place, int_of(step)), INT)
-    return Operation(tree.COUNT_ADD, (int_of(first), found), INT) if first else found
+        offset = Operation(tree.COUNT_MULTIPLY, (place, int_of(step)), INT)
+    return Operation(tree.COUNT_ADD, (int_of(first), offset), INT) if first else offset
 
 
 def _is_fixed(value: Expression) -> bool:
@@ -2094,8 +2107,8 @@ def _as_int(value: Expression) -> Expression:
 #: Translations of calls of built-in functions.
 _BUILT_IN: Mapping[Any, Callable[[_Builder, ast.Call], Expression]] = {
     len: _Builder._len,
-    **{one: partial(_Builder._of_number, name=one.__name__)
-       for one in (abs, bool, float, int, round)},
-    **{one: partial(_Builder._extreme, word=one.__name__) for one in (max, min)},
-    **{one: partial(_Builder._of_generator, word=one.__name__) for one in (all, any, sum)},
+    **{known: partial(_Builder._of_number, name=known.__name__)
+       for known in (abs, bool, float, int, round)},
+    **{known: partial(_Builder._extreme, word=known.__name__) for known in (max, min)},
+    **{known: partial(_Builder._of_generator, word=known.__name__) for known in (all, any, sum)},
 }  # fmt: skip

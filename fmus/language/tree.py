@@ -181,12 +181,12 @@ class Choice(Expression):
     """One of two values, chosen by a condition."""
 
     test: Expression
-    one: Expression
+    this: Expression
     other: Expression
 
     def __post_init__(self) -> None:
         """Set its type."""
-        self.type = self.one.type
+        self.type = self.this.type
         super().__post_init__()
 
 
@@ -380,7 +380,7 @@ def calls_in(body: Sequence[Statement]) -> Iterator[Call]:
     """Yield all calls in a block, including nested ones."""
     for statement in statements_in(body):
         for expression in expressions_of(statement):
-            yield from (one for one in expressions_in(expression) if isinstance(one, Call))
+            yield from (part for part in expressions_in(expression) if isinstance(part, Call))
 
 
 def stored_in(statement: Statement) -> list[str]:
@@ -392,20 +392,20 @@ def stored_in(statement: Statement) -> list[str]:
 
 def variables_in(body: Sequence[Statement]) -> dict[str, Type]:
     """Return the variables that a block assigns, with their types."""
-    found: dict[str, Type] = {}
-    for one in statements_in(body):
-        if isinstance(one, Store):
-            found |= {name: value.type for name, value in one.values}
-        elif isinstance(one, Reserve):
-            found[one.name] = one.type
-    return found
+    types: dict[str, Type] = {}
+    for statement in statements_in(body):
+        if isinstance(statement, Store):
+            types |= {name: value.type for name, value in statement.values}
+        elif isinstance(statement, Reserve):
+            types[statement.name] = statement.type
+    return types
 
 
 def may_fail(statement: Statement) -> bool:
     """Return True if a statement itself can fail, or must stop after a failure."""
     ends = isinstance(statement, (Raise, While))
     is_endless = isinstance(statement, For) and statement.turns is None
-    return ends or is_endless or any(one.fails for one in expressions_of(statement))
+    return ends or is_endless or any(expression.fails for expression in expressions_of(statement))
 
 
 def int_of(value: int) -> Number:

@@ -207,8 +207,8 @@ def type_of(hint: Any) -> Type:
 
 def enumeration(made: type[IntEnum]) -> Scalar:
     """Return the type of an enumeration."""
-    for one in made.__mro__[: made.__mro__.index(IntEnum)]:
-        _check_plain(one)
+    for base in made.__mro__[: made.__mro__.index(IntEnum)]:
+        _check_plain(base)
     return Scalar(_one(made), made)
 
 
@@ -301,8 +301,8 @@ def check_value(value: Any, type_: Type, name: str) -> None:
         made = type_.made or tuple
         if not isinstance(value, made) or len(value) != len(parts):
             raise TypeError(f"{name} is not {type_.word}")
-        for field, one, part in zip(getattr(value, "_fields", range(len(value))), value, parts):
-            check_value(one, part, f"{name}.{field}")
+        for field, item, part in zip(getattr(value, "_fields", range(len(value))), value, parts):
+            check_value(item, part, f"{name}.{field}")
         return
     if type_ == FLOAT and isinstance(value, int):
         raise TypeError(f"{name} is an int where a float is wanted: write {value}.0")

@@ -82,7 +82,7 @@ _BREAK = "\x02"
 def quoted(text: str) -> str:
     """Return a string literal of C."""
     escaped = text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    escaped = re.sub(r"[\x00-\x1f\x7f]", lambda found: f"\\{ord(found[0]):03o}", escaped)
+    escaped = re.sub(r"[\x00-\x1f\x7f]", lambda match: f"\\{ord(match[0]):03o}", escaped)
     # Two question marks may begin a trigraph.
     escaped = escaped.replace("?", "\\?") if "??" in escaped else escaped
     return f'"{escaped}"'
@@ -103,8 +103,8 @@ def lines_of(text: str, indent: str) -> list[str]:
         else:
             lines.append(begin + item)
         begin = indent + INDENT
-    found = [part for line in lines for part in _wrapped(line, begin)]
-    return [line.replace(_KEPT, " ") for line in found]
+    wrapped = [part for line in lines for part in _wrapped(line, begin)]
+    return [line.replace(_KEPT, " ") for line in wrapped]
 
 
 def _wrapped(line: str, indent: str) -> list[str]:
@@ -187,10 +187,10 @@ class Emitter:
 
         """
         functions = [*functions]
-        self._addressed = {one: _addressed(one, most_copied) for one in functions}
+        self._addressed = {function: _addressed(function, most_copied) for function in functions}
         self._shared = {
-            one: given | _large_parts(one, given, most_copied)
-            for one, given in self._addressed.items()
+            function: given | _large_parts(function, given, most_copied)
+            for function, given in self._addressed.items()
         }
         self.structures: dict[str, str] = {}
         self.constants: dict[str, str] = {}
@@ -198,13 +198,16 @@ class Emitter:
         self._constants: dict[tree.Constant, str] = {}
         self._wrappers: dict[str, str] = {}
         #: Names of variables, which nothing else may have.
-        self._variables = {in_c(name) for one in functions for name in _variables(one)}
+        self._variables = {in_c(name) for function in functions for name in _variables(function)}
         #: Names of structures, functions and constants, and of functions of `math` that raise.
         self._taken = {f"math_{name}" for name in FUNCTIONS}
-        for one in functions:
-            for type_ in (*one.arguments.values(), one.returns):
+        for function in functions:
+            for type_ in (*function.arguments.values(), function.returns):
                 self.type(type_)
-        self.names = {one: self._in_module(one.module, one.name, *one.sizes) for one in functions}
+        self.names = {
+            function: self._in_module(function.module, function.name, *function.sizes)
+            for function in functions
+        }
 
     def text(self) -> str:
         """Return all definitions."""
@@ -243,8 +246,8 @@ class Emitter:
         """Return a name for a function or constant of a module."""
         stems = (part.lstrip("_") for part in (module.rpartition(".")[2], name))
         parts = [*stems, *map(self.type, sizes)]
-        found = re.sub(r"\W+", "_", "_".join(filter(None, parts)))
-        return self.unused(found if found.isidentifier() else f"of_{found}")
+        word = re.sub(r"\W+", "_", "_".join(filter(None, parts)))
+        return self.unused(word if word.isidentifier() else f"of_{word}")
 
     # Types and constants
 
@@ -292,19 +295,20 @@ class Emitter:
         self.structures[name] = "\n".join([*head, "typedef struct {", *rows, f"}} {name};"])
         return name
 
-    def constant(self, one: tree.Constant) -> str:
+    def constant(self, constant: tree.Constant) -> str:
         """Define a constant, and return its name."""
-        if one not in self._constants:
-            name = self._constants[one] = self._in_module(one.module, one.name)
-            value = f"{self.declared(one.type)}{name} = {self._literal(one.value, one.type)}"
+        if constant not in self._constants:
+            name = self._constants[constant] = self._in_module(constant.module, constant.name)
+            literal = self._literal(constant.value, constant.type)
+            value = f"{self.declared(constant.type)}{name} = {literal}"
             self.constants[name] = "\n".join(lines_of(f"static const {value};", ""))
-        return self._constants[one]
+        return self._constants[constant]
 
     def _literal(self, value: Any, type_: Type) -> str:
         """Return the initializer of a value."""
         if isinstance(type_, Scalar):
             return number_in_c(value)
-        parts = _list(self._literal(one, part) for one, (_, part) in zip(value, members(type_)))
+        parts = _list(self._literal(item, part) for item, (_, part) in zip(value, members(type_)))
         return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
 
     def wrap(self, name: str) -> None:
@@ -348,110 +352,115 @@ class _Definition:
 
     # Expressions
 
-    def expression(self, one: Expression, within: int = _TERNARY) -> str:
+    def expression(self, expression: Expression, within: int = _TERNARY) -> str:
         """Return an expression, in brackets if the context has a higher precedence."""
-        text, binding = self._bound(one)
+        text, binding = self._bound(expression)
         if binding != _POSTFIX:
             text = text.replace(_BREAK, " ")
         return text if binding >= within else f"({text})"
 
-    def _bound(self, one: Expression) -> tuple[str, int]:  # noqa: PLR0911, for each class
+    def _bound(self, expression: Expression) -> tuple[str, int]:  # noqa: PLR0911, for each class
         """Return an expression and the precedence of its outermost operator."""
-        if isinstance(one, Number):
-            text = number_in_c(one.value)
+        if isinstance(expression, Number):
+            text = number_in_c(expression.value)
             return text, _UNARY if text.startswith("-") else _POSTFIX
-        if isinstance(one, tree.Text):
-            return unbroken(one.value), _POSTFIX
-        if isinstance(one, Local):
-            name = in_c(one.name)
-            return f"(*{name})" if one.name in self._addressed else name, _POSTFIX
-        if isinstance(one, tree.Constant):
-            return self._emitter.constant(one), _POSTFIX
-        if isinstance(one, Field):
-            return f"{self._member(one.owner)}{in_c(one.name)}", _POSTFIX
-        if isinstance(one, Item):
-            return f"{self._owner(one.owner)}v[{self.expression(one.place)}]", _POSTFIX
-        if isinstance(one, Make):
-            return f"({self._emitter.type(one.type)}){self._initial(one)}", _POSTFIX
-        if isinstance(one, Choice):
-            test, this = (self.expression(part, _OR) for part in (one.test, one.one))
-            return f"{test} ? {this} : {self.expression(one.other)}", _TERNARY
-        if isinstance(one, Call):
-            addressed = self._emitter.addressed(one.function)
+        if isinstance(expression, tree.Text):
+            return unbroken(expression.value), _POSTFIX
+        if isinstance(expression, Local):
+            name = in_c(expression.name)
+            return f"(*{name})" if expression.name in self._addressed else name, _POSTFIX
+        if isinstance(expression, tree.Constant):
+            return self._emitter.constant(expression), _POSTFIX
+        if isinstance(expression, Field):
+            return f"{self._member(expression.owner)}{in_c(expression.name)}", _POSTFIX
+        if isinstance(expression, Item):
+            return (
+                f"{self._owner(expression.owner)}v[{self.expression(expression.place)}]",
+                _POSTFIX,
+            )
+        if isinstance(expression, Make):
+            return f"({self._emitter.type(expression.type)}){self._initial(expression)}", _POSTFIX
+        if isinstance(expression, Choice):
+            test, this = (self.expression(part, _OR) for part in (expression.test, expression.this))
+            return f"{test} ? {this} : {self.expression(expression.other)}", _TERNARY
+        if isinstance(expression, Call):
+            addressed = self._emitter.addressed(expression.function)
             given = [
                 self._address(part) if name in addressed else self.expression(part)
-                for name, part in zip(one.function.arguments, one.parts)
+                for name, part in zip(expression.function.arguments, expression.parts)
             ]
-            name = self._emitter.names[one.function]
-            return _call(name, given, one.function.fails), _POSTFIX
-        assert isinstance(one, Operation)
-        return self._operation(one)
+            name = self._emitter.names[expression.function]
+            return _call(name, given, expression.function.fails), _POSTFIX
+        assert isinstance(expression, Operation)
+        return self._operation(expression)
 
-    def _address(self, one: Expression) -> str:
+    def _address(self, expression: Expression) -> str:
         """Return the address of a value."""
-        if isinstance(one, Local) and one.name in self._addressed:
-            return in_c(one.name)
-        root = one
+        if isinstance(expression, Local) and expression.name in self._addressed:
+            return in_c(expression.name)
+        root = expression
         while isinstance(root, (Field, Item)):
             root = root.owner
         if isinstance(root, (Local, tree.Constant, Make)):
-            return f"&{self.expression(one, _UNARY)}"
-        return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}"
+            return f"&{self.expression(expression, _UNARY)}"
+        return f"({self._emitter.type(expression.type)}[1]){{{self.expression(expression)}}}"
 
-    def _member(self, one: Expression) -> str:
+    def _member(self, expression: Expression) -> str:
         """Return a structure with the operator for access to a member."""
-        if isinstance(one, Local) and one.name in self._addressed:
-            return f"{in_c(one.name)}->"
-        return f"{self.expression(one, _POSTFIX)}."
+        if isinstance(expression, Local) and expression.name in self._addressed:
+            return f"{in_c(expression.name)}->"
+        return f"{self.expression(expression, _POSTFIX)}."
 
-    def _owner(self, one: Expression) -> str:
+    def _owner(self, expression: Expression) -> str:
         """Return an array with the operator for access to a member."""
-        root = one
+        root = expression
         while isinstance(root, Field):
             root = root.owner
         if not isinstance(root, (Call, Choice)):
-            return self._member(one)
+            return self._member(expression)
         # In C99, the lifetime of a result may end before its element is read.
-        return f"({self._emitter.type(one.type)}[1]){{{self.expression(one)}}}->"
+        return f"({self._emitter.type(expression.type)}[1]){{{self.expression(expression)}}}->"
 
-    def _initial(self, one: Expression) -> str:
+    def _initial(self, expression: Expression) -> str:
         """Return a value in a context that determines its type."""
-        if not isinstance(one, Make):
-            return self.expression(one)
-        texts = [self._initial(part) for part in one.parts]
-        if isinstance(one.type, Array):
+        if not isinstance(expression, Make):
+            return self.expression(expression)
+        texts = [self._initial(part) for part in expression.parts]
+        if isinstance(expression.type, Array):
             return f"{{{{{_list(texts)}}}}}"
-        filled = [f"{name} = {text}" for (name, _), text in zip(members(one.type), texts)]
+        filled = [f"{name} = {text}" for (name, _), text in zip(members(expression.type), texts)]
         return f"{{{_list(filled) or '0'}}}"
 
-    def _mathematics(self, one: Operation, op: Operator) -> tuple[str, int]:
-        texts = [self.expression(part) for part in one.operands]
+    def _mathematics(self, operation: Operation, op: Operator) -> tuple[str, int]:
+        texts = [self.expression(part) for part in operation.operands]
         # A macro would take the commas of a structure for its own.
-        if any(isinstance(part, Make) for each in one.parts for part in tree.expressions_in(each)):
+        if any(
+            isinstance(part, Make) for each in operation.parts for part in tree.expressions_in(each)
+        ):
             texts = [f"({text})" for text in texts]
         if op.fails:
             self._emitter.wrap(op.function)
             return _call(f"math_{op.function}", texts, True), _POSTFIX
         text = _call(op.function, texts, False)
-        return (f"{text} != 0", _EQUALITY) if one.type == BOOL else (text, _POSTFIX)
+        return (f"{text} != 0", _EQUALITY) if operation.type == BOOL else (text, _POSTFIX)
 
-    def _operation(self, one: Operation) -> tuple[str, int]:  # noqa: PLR0911, for each operator
-        op = one.operator
+    def _operation(self, operation: Operation) -> tuple[str, int]:  # noqa: PLR0911, by operator
+        op = operation.operator
         if op.function:
-            return self._mathematics(one, op)
+            return self._mathematics(operation, op)
         if op in _INFIX:
             sign, binding = _INFIX[op]
             # Compilers warn of a comparison in another one without brackets.
             both = (_SUM, _SUM) if binding < _SUM else (binding, binding + 1)
-            left, right = (self.expression(*each) for each in zip(one.parts, both))
+            left, right = (self.expression(*each) for each in zip(operation.parts, both))
             return f"{left} {sign} {right}", binding
         if op in _CALLED:
-            return _call(_CALLED[op], map(self.expression, one.parts), op.fails), _POSTFIX
+            return _call(_CALLED[op], map(self.expression, operation.parts), op.fails), _POSTFIX
         if op in (tree.AND, tree.OR):
             sign, binding = (" || ", _OR) if op == tree.OR else (" && ", _AND)
             # Compilers warn of && in || without brackets.
-            return sign.join(self.expression(p, _EQUALITY) for p in one.parts), binding
-        [part] = one.parts
+            return sign.join(self.expression(p, _EQUALITY) for p in operation.parts), binding
+        [part] = operation.parts
         if op == tree.AS_INT:
             return self._bound(part)
         if op == tree.TO_BOOL:
@@ -483,10 +492,10 @@ class _Definition:
             new = here.get(i, [])
             if not isinstance(statement, (tree.Store, tree.Reserve)):
                 lines += [f"{indent}{self._zero(name, types[name])}" for name in new]
-            found = [*self._statement(statement, new, stores, known, indent)]
-            if statement.comment and found:
-                found = _annotated(found, f"/* {closed(statement.comment)} */", indent)
-            lines += found
+            texts = [*self._statement(statement, new, stores, known, indent)]
+            if statement.comment and texts:
+                texts = _annotated(texts, f"/* {closed(statement.comment)} */", indent)
+            lines += texts
         return lines
 
     def _zero(self, name: str, type_: Type) -> str:
@@ -496,33 +505,35 @@ class _Definition:
 
     def _statement(
         self,
-        one: Statement,
+        statement: Statement,
         new: Sequence[str],
         stores: Counter[str],
         known: set[str],
         indent: str,
     ) -> Iterator[str]:
         inner, emitter = indent + INDENT, self._emitter
-        if isinstance(one, tree.Store):
-            yield from self._stored(one, new, stores, indent)
-        elif isinstance(one, tree.Reserve):
-            yield f"{indent}{emitter.declared(one.type)}{in_c(one.name)};"
-        elif isinstance(one, tree.StoreItem):
-            places = "".join(f".v[{self.expression(place)}]" for place in one.places)
-            yield from lines_of(f"{in_c(one.name)}{places} = {self.expression(one.value)};", indent)
-        elif isinstance(one, tree.Do):
-            text = self.expression(one.call, _UNARY)
-            is_plain = isinstance(one.call, Call) and one.call.type == NOTHING
+        if isinstance(statement, tree.Store):
+            yield from self._stored(statement, new, stores, indent)
+        elif isinstance(statement, tree.Reserve):
+            yield f"{indent}{emitter.declared(statement.type)}{in_c(statement.name)};"
+        elif isinstance(statement, tree.StoreItem):
+            places = "".join(f".v[{self.expression(place)}]" for place in statement.places)
+            yield from lines_of(
+                f"{in_c(statement.name)}{places} = {self.expression(statement.value)};", indent
+            )
+        elif isinstance(statement, tree.Do):
+            text = self.expression(statement.call, _UNARY)
+            is_plain = isinstance(statement.call, Call) and statement.call.type == NOTHING
             yield from lines_of(f"{text};" if is_plain else f"(void){text};", indent)
-        elif isinstance(one, tree.Return):
-            yield from self._returned(one, indent)
-        elif isinstance(one, (tree.Break, tree.Continue)):
-            yield f"{indent}{type(one).__name__.lower()};"
-        elif isinstance(one, tree.Raise):
-            yield from lines_of(self._raised(one), indent)
+        elif isinstance(statement, tree.Return):
+            yield from self._returned(statement, indent)
+        elif isinstance(statement, (tree.Break, tree.Continue)):
+            yield f"{indent}{type(statement).__name__.lower()};"
+        elif isinstance(statement, tree.Raise):
+            yield from lines_of(self._raised(statement), indent)
             yield f"{indent}{self._left()}"
-        elif isinstance(one, tree.If):
-            head, (chain, orelse) = "if", _chain(one)
+        elif isinstance(statement, tree.If):
+            head, (chain, orelse) = "if", _chain(statement)
             for each in chain:
                 yield from lines_of(f"{head} ({self.expression(each.test)}) {{", indent)
                 yield from self._block(each.body, known, inner)
@@ -532,26 +543,26 @@ class _Definition:
                 yield from self._block(orelse, known, inner)
             yield f"{indent}}}"
         else:
-            assert isinstance(one, (tree.While, tree.For))
-            yield from lines_of(f"{self._head(one)} {{", indent)
-            counter = {one.counter} if isinstance(one, tree.For) else set()
-            yield from self._block(one.body, known | counter, inner)
+            assert isinstance(statement, (tree.While, tree.For))
+            yield from lines_of(f"{self._head(statement)} {{", indent)
+            counter = {statement.counter} if isinstance(statement, tree.For) else set()
+            yield from self._block(statement.body, known | counter, inner)
             yield f"{indent}}}"
 
-    def _head(self, one: tree.While | tree.For) -> str:
+    def _head(self, loop: tree.While | tree.For) -> str:
         """Return the first line of a loop, which also tests for errors in its body."""
-        if isinstance(one, tree.While):
-            return f"while (!error->raised && {self.expression(one.test, _AND)})"
-        fails = one.turns is None or any(map(tree.may_fail, tree.statements_in(one.body)))
-        name, sign = in_c(one.counter), "<" if one.step > 0 else ">"
-        test = f"{name} {sign} {self.expression(one.stop, _SUM)}"
+        if isinstance(loop, tree.While):
+            return f"while (!error->raised && {self.expression(loop.test, _AND)})"
+        fails = loop.turns is None or any(map(tree.may_fail, tree.statements_in(loop.body)))
+        name, sign = in_c(loop.counter), "<" if loop.step > 0 else ">"
+        test = f"{name} {sign} {self.expression(loop.stop, _SUM)}"
         test = f"!error->raised && {test}" if fails else test
-        change = {1: f"{name}++", -1: f"{name}--"}.get(one.step, f"{name} += {one.step}")
-        kind = _WIDE if one.is_wide else "int"
-        return f"for ({kind} {name} = {self.expression(one.start)}; {test}; {change})"
+        change = {1: f"{name}++", -1: f"{name}--"}.get(loop.step, f"{name} += {loop.step}")
+        kind = _WIDE if loop.is_wide else "int"
+        return f"for ({kind} {name} = {self.expression(loop.start)}; {test}; {change})"
 
     def _stored(
-        self, one: tree.Store, new: Sequence[str], stores: Counter[str], indent: str
+        self, store: tree.Store, new: Sequence[str], stores: Counter[str], indent: str
     ) -> Iterator[str]:
         """Yield assignments; new variables of one type are declared together."""
 
@@ -561,7 +572,7 @@ class _Definition:
             is_apart = name in self._parts or (made.type == TEXT and is_new)
             return is_new, is_new and stores[name] == 1, made.type, name if is_apart else ""
 
-        for (is_new, is_constant, type_, apart), group in groupby(one.values, alike):
+        for (is_new, is_constant, type_, apart), group in groupby(store.values, alike):
             if apart in self._parts:
                 [(name, value)] = group
                 text = f"const {self._emitter.type(type_)} *{in_c(name)} = {self._address(value)};"
@@ -574,13 +585,21 @@ class _Definition:
             text = _list(texts) if is_new and len(texts) > 1 else "; ".join(texts)
             yield from lines_of(f"{head}{text};", indent)
 
-    def _returned(self, one: tree.Return, indent: str) -> Iterator[str]:
-        text = f"return {self.expression(one.value)};" if one.value is not None else "return;"
+    def _returned(self, statement: tree.Return, indent: str) -> Iterator[str]:
+        text = (
+            f"return {self.expression(statement.value)};"
+            if statement.value is not None
+            else "return;"
+        )
         is_long = len(indent) + len(text) > LINE_WIDTH
-        if is_long and isinstance(one.value, Make) and isinstance(one.value.type, Record):
+        if (
+            is_long
+            and isinstance(statement.value, Make)
+            and isinstance(statement.value.type, Record)
+        ):
             # A line for each field.
-            yield f"{indent}return ({self._emitter.type(one.value.type)}){{"
-            for (name, _), part in zip(members(one.value.type), one.value.parts):
+            yield f"{indent}return ({self._emitter.type(statement.value.type)}){{"
+            for (name, _), part in zip(members(statement.value.type), statement.value.parts):
                 yield from lines_of(f"{name} = {self._initial(part)},", indent + INDENT)
             yield f"{indent}}};"
             return
@@ -594,9 +613,9 @@ class _Definition:
         is_number = isinstance(returns, Scalar)
         return "return 0;" if is_number else f"return ({self._emitter.type(returns)}){{0}};"
 
-    def _raised(self, one: tree.Raise) -> str:
+    def _raised(self, statement: tree.Raise) -> str:
         form, arguments = "", []
-        for part in one.parts:
+        for part in statement.parts:
             if isinstance(part, str):
                 form += part.replace("%", "%%")
                 continue
@@ -611,7 +630,11 @@ class _Definition:
 
 def _addressed(function: Function, most_copied: float) -> frozenset[str]:
     """Return the arguments that are passed by address: large ones that are not changed."""
-    stored = {name for one in tree.statements_in(function.body) for name in tree.stored_in(one)}
+    stored = {
+        name
+        for statement in tree.statements_in(function.body)
+        for name in tree.stored_in(statement)
+    }
     large = {name for name, type_ in function.arguments.items() if count(type_) > most_copied}
     return frozenset({function.by_address} | (large - stored)) - {""}
 
@@ -621,8 +644,8 @@ def _large_parts(
 ) -> frozenset[str]:
     """Return the variables that are large parts of such arguments: pointers, too."""
     stores, found = Counter(_stores(function.body)), {*addressed}
-    for one in function.body:
-        for name, value in one.values if isinstance(one, tree.Store) else ():
+    for statement in function.body:
+        for name, value in statement.values if isinstance(statement, tree.Store) else ():
             root = value
             while isinstance(root, Field):
                 root = root.owner
@@ -641,42 +664,45 @@ def _ends(body: Sequence[Statement]) -> bool:
     return isinstance(last, (tree.Return, tree.Raise))
 
 
-def _chain(one: tree.If) -> tuple[list[tree.If], Sequence[Statement]]:
+def _chain(branch: tree.If) -> tuple[list[tree.If], Sequence[Statement]]:
     """Return an if with its chain of elifs, and the block of the final else."""
-    found, orelse = [one], one.orelse
+    branches, orelse = [branch], branch.orelse
     while len(orelse) == 1 and isinstance(orelse[0], tree.If) and not orelse[0].comment:
-        found.append(orelse[0])
+        branches.append(orelse[0])
         orelse = orelse[0].orelse
-    return found, orelse
+    return branches, orelse
 
 
-def _used(one: Statement, deep: bool = True) -> Iterator[str]:
+def _used(statement: Statement, deep: bool = True) -> Iterator[str]:
     """Yield the variables that a statement uses or assigns; if `deep`, also in its blocks."""
-    rest = [(one, frozenset[str]())]
+    rest = [(statement, frozenset[str]())]
     while rest:
-        one, counters = rest.pop()
-        if isinstance(one, tree.For):
-            counters |= {one.counter}
-        parts = (part for each in tree.expressions_of(one) for part in tree.expressions_in(each))
-        names = [part.name for part in parts if isinstance(part, Local)] + tree.stored_in(one)
+        statement, counters = rest.pop()
+        if isinstance(statement, tree.For):
+            counters |= {statement.counter}
+        parts = (
+            part for each in tree.expressions_of(statement) for part in tree.expressions_in(each)
+        )
+        names = [part.name for part in parts if isinstance(part, Local)] + tree.stored_in(statement)
         yield from (name for name in names if name not in counters)
-        inner = [statement for block in tree.blocks_of(one) for statement in block if deep]
-        rest += [(statement, counters) for statement in reversed(inner)]
+        inner = [nested for block in tree.blocks_of(statement) for nested in block if deep]
+        rest += [(nested, counters) for nested in reversed(inner)]
 
 
 def _stores(statements: Sequence[Statement]) -> Iterator[str]:
     """Yield the variables that are assigned, each time; twice for changes of elements."""
-    for one in tree.statements_in(statements):
-        yield from tree.stored_in(one) * (1 + isinstance(one, (tree.StoreItem, tree.Reserve)))
+    for statement in tree.statements_in(statements):
+        is_twice = isinstance(statement, (tree.StoreItem, tree.Reserve))
+        yield from tree.stored_in(statement) * (1 + is_twice)
 
 
 def _variables(function: Function) -> Iterator[str]:
     """Yield the names of all arguments and variables of a function."""
     yield from function.arguments
-    for one in tree.statements_in(function.body):
-        yield from tree.stored_in(one)
-        if isinstance(one, tree.For):
-            yield one.counter
+    for statement in tree.statements_in(function.body):
+        yield from tree.stored_in(statement)
+        if isinstance(statement, tree.For):
+            yield statement.counter
 
 
 def _annotated(lines: list[str], comment: str, indent: str) -> list[str]:
@@ -695,5 +721,5 @@ def _comments(made: Any) -> dict[str, str]:
         text = inspect.getsource(made)
     except OSError:
         return {}  # made without a class statement
-    found = re.findall(r"^    (\w+):.*#: (.*)$", text, re.MULTILINE)
-    return {name: f" /* {strip_sphinx_marks(text)} */" for name, text in found}
+    comments = re.findall(r"^    (\w+):.*#: (.*)$", text, re.MULTILINE)
+    return {name: f" /* {strip_sphinx_marks(text)} */" for name, text in comments}

@@ -85,7 +85,7 @@ def words_of_runtime() -> frozenset[str]:
 
 def is_of_library(name: str) -> bool:
     """Return True if a C library may have a function, a type or a macro of this name."""
-    return name in _TAKEN or any(one.fullmatch(name) for one in (_LIBRARY, _MACROS))
+    return name in _TAKEN or any(pattern.fullmatch(name) for pattern in (_LIBRARY, _MACROS))
 
 
 @cache

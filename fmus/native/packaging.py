@@ -113,7 +113,7 @@ def fmu_entries(
         translated(definition),
         tables(definition, arrays),
         documents,
-        terminals_of({"": [one.port for one in variables_of(definition.ports, arrays)]}),
+        terminals_of({"": [variable.port for variable in variables_of(definition.ports, arrays)]}),
         arrays,
     )
     return entries_of(parts, fmi, platforms, compiler, report)

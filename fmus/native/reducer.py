@@ -44,7 +44,7 @@ class ReducerText:
 
     def text(self) -> Iterator[str]:
         """Yield the functions that process a row and return the numbers."""
-        row, found = self._type(self.reducer.inputs), self._type(self.reducer.outputs)
+        row, outputs = self._type(self.reducer.inputs), self._type(self.reducer.outputs)
         start, update = self._call("start"), self._call("update", state="it->state")
         lines = [
             "if (it->begun < 0) return;",
@@ -74,7 +74,7 @@ class ReducerText:
         lines = [
             f"for (int i = 0; i < {len(results)}; i++) found[i] = NAN;",
             "if (it->begun < 1) return;",
-            f"const {found} all = {self._call('outputs', state='it->state')};",
+            f"const {outputs} all = {self._call('outputs', state='it->state')};",
             *(f"found[{i}] = {text};" for i, text in enumerate(numbers)),
         ]
         yield "/* Returns the numbers, which are NaN before the first row. */\n" + function(
@@ -112,7 +112,7 @@ class ReducerText:
 
     def _call(self, hook: str, **given: str) -> str:
         function = self.program.function(self.reducer.hooks[hook])
-        return self.emitter.call(function, [given.get(one, one) for one in function.arguments])
+        return self.emitter.call(function, [given.get(name, name) for name in function.arguments])
 
 
 _ROWS = """\
@@ -176,7 +176,7 @@ def text_over_rows(reducer: Reducer) -> str | None:
     if program.mistakes:
         return None
     emitter = Emitter(program.functions.values())
-    one = ReducerText(reducer, program, emitter, emitter.unused(f"{reducer.name}_index"))
-    functions, rows = [*one.text()], one.over_rows()
+    text = ReducerText(reducer, program, emitter, emitter.unused(f"{reducer.name}_index"))
+    functions, rows = [*text.text()], text.over_rows()
     head = '#include "arithmetic.h"\n\n#define APART static'
-    return "\n\n".join([head, emitter.text(), one.structure(), *functions, rows, _WHY])
+    return "\n\n".join([head, emitter.text(), text.structure(), *functions, rows, _WHY])

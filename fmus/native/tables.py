@@ -61,8 +61,8 @@ def port_tables(
         for causality in ("input", "output")
     }
     places = {FAULT.name: "0", **parameters}
-    for found in values.values():
-        places |= {port.name: str(place) for place, port in enumerate(found)}
+    for some in values.values():
+        places |= {port.name: str(place) for place, port in enumerate(some)}
     ports = (*ports, FAULT)
     names = names_of_choices(ports)
     rows = "".join(f"    {{{_row(port, places, names)}}},\n" for port in ports)
@@ -73,7 +73,7 @@ def port_tables(
             f"static const port ports[] = {{\n{rows}}};\n",
             f"enum {{ N_PORTS = {len(ports)} }};\n",
             *(_arrays(ports) if arrays else ()),
-            *(_references(causality, found, ports) for causality, found in values.items()),
+            *(_references(causality, some, ports) for causality, some in values.items()),
             *_counts(values),
             *_state(state),
         )
@@ -137,16 +137,16 @@ def _choices(name: str, choices: Mapping[str, Any]) -> str:
 def _references(causality: str, values: Sequence[Port], ports: Sequence[Port]) -> str:
     """Write the value references of a causality in the order of values; C has no empty arrays."""
     places = {port.name: place for place, port in enumerate(ports)}
-    found = [places[port.name] for port in values] or [0]
-    numbers = ", ".join(f"FIRST_REFERENCE + {place}" for place in found)
+    chosen = [places[port.name] for port in values] or [0]
+    numbers = ", ".join(f"FIRST_REFERENCE + {place}" for place in chosen)
     return f"static const uint32_t {causality}_references[] = {{{numbers}}};\n"
 
 
 def _counts(values: Mapping[str, Sequence[Port]]) -> Iterator[str]:
     """Write the numbers of Reals, and whether a Real input has a range."""
     reals = {
-        causality: [port for port in found if port.type == "Real"]
-        for causality, found in values.items()
+        causality: [port for port in some if port.type == "Real"]
+        for causality, some in values.items()
     }
     ranged = any((port.minimum, port.maximum) != (None, None) for port in reals["input"])
     yield (
@@ -157,7 +157,7 @@ def _counts(values: Mapping[str, Sequence[Port]]) -> Iterator[str]:
 
 def _state(scalars: Iterable[Any]) -> Iterator[str]:
     """Write the types of a state's numbers, in order."""
-    runs = [(scalar, len([*found])) for scalar, found in groupby(scalars)]
+    runs = [(scalar, len([*same])) for scalar, same in groupby(scalars)]
     rows: list[str] = []
     enumerations: dict[Any, str] = {}
     for scalar, n in runs:

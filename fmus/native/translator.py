@@ -176,9 +176,9 @@ def _glue(emitter: Emitter, program: Program, behaviour: Behaviour) -> str:
     text = "\n\n".join(parts)
     # Compilers warn of static functions that are not called.
     moving = [
-        one
+        function
         for form in passages.values()
-        for name, one in zip((form.gather, form.scatter), form.functions)
+        for name, function in zip((form.gather, form.scatter), form.functions)
         if re.search(rf"\b{name}\(", text)
     ]
     head = ["/* The functions for the runtime. */", _types(emitter, behaviour, passages), *moving]
@@ -187,16 +187,16 @@ def _glue(emitter: Emitter, program: Program, behaviour: Behaviour) -> str:
 
 def _constants(behaviour: Behaviour) -> str:
     """Write the constants that follow from the hooks."""
-    found = {
+    numbers = {
         "DRAWS": behaviour.draws,
         "SAMPLED": behaviour.is_sampled,
         "HAS_GUARD": behaviour.hooks["credible"] is not None,
         **{name: behaviour.takes(*question) for name, question in _TAKES.items()},
     }
-    return constants(found, _directives(behaviour.restarted))
+    return constants(numbers, _directives(behaviour.restarted))
 
 
-def constants(found: Mapping[str, int], restarted: str = "") -> str:
+def constants(numbers: Mapping[str, int], restarted: str = "") -> str:
     """Write the constants for the runtime.
 
     Args:
@@ -204,7 +204,7 @@ def constants(found: Mapping[str, int], restarted: str = "") -> str:
         restarted: message when a state is replaced, in the format of `compose`.
 
     """
-    rows = "".join(f"    MODEL_{name} = {int(found.get(name, 0))},\n" for name in _ASKED)
+    rows = "".join(f"    MODEL_{name} = {int(numbers.get(name, 0))},\n" for name in _ASKED)
     return f"enum {{\n{rows}}};\n#define MODEL_RESTARTED {quoted(restarted)}"
 
 
@@ -331,13 +331,17 @@ def deepest(
     """
     depths: dict[Function, int] = {}
     for called in functions:
-        found = [x for one in tree.statements_in(called.body) for x in tree.expressions_of(one)]
-        own = sum(map(_held, found))
+        expressions = [
+            expression
+            for statement in tree.statements_in(called.body)
+            for expression in tree.expressions_of(statement)
+        ]
+        own = sum(map(_held, expressions))
         named = chain(called.arguments.items(), tree.variables_in(called.body).items())
         own += sum(_result(type_) for name, type_ in named if name not in shared(called))
-        deeper = max((depths[one.function] for one in tree.calls_in(called.body)), default=0)
+        deeper = max((depths[call.function] for call in tree.calls_in(called.body)), default=0)
         depths[called] = own + deeper
-    ends = ((depth + _result(one.returns), one) for one, depth in depths.items())
+    ends = ((depth + _result(function.returns), function) for function, depth in depths.items())
     return max(ends, key=itemgetter(0), default=(0, None))
 
 
@@ -346,8 +350,10 @@ def _result(type_: Type) -> int:
     return 0 if isinstance(type_, Scalar) else _NUMBER * count(type_)
 
 
-def _held(one: Expression, within: bool = False) -> int:
+def _held(expression: Expression, within: bool = False) -> int:
     """Return the bytes of the structures that an expression makes or receives from calls."""
-    is_made = isinstance(one, Make)
-    own = _result(one.type) if isinstance(one, Call) or (is_made and not within) else 0
-    return own + sum(_held(part, is_made) for part in one.parts)
+    is_made = isinstance(expression, Make)
+    own = (
+        _result(expression.type) if isinstance(expression, Call) or (is_made and not within) else 0
+    )
+    return own + sum(_held(part, is_made) for part in expression.parts)

@@ -135,17 +135,17 @@ def read_behaviour(module: ModuleType) -> Behaviour:
     noisy = _noisy(where, hints, outputs)
     types = _types_of_groups(hints)
     if "state" in types and "start" not in hooks:
-        name = next(name for name, found in hints.items() if "state" in found)
+        name = next(name for name, own in hints.items() if "state" in own)
         raise Misdeclared(f"{where}.{name} takes a state, but there is no start", name)
-    for name, found in hints.items():
+    for name, own in hints.items():
         if name not in ("outputs", "measured"):
             wanted = _RETURNS[name] if name in _RETURNS else types[_SAME[name]]
-            check_same(where, name, "return", found["return"], wanted)
-        for argument, hint in found.items():
+            check_same(where, name, "return", own["return"], wanted)
+        for argument, hint in own.items():
             if argument not in ("return", *noisy) and (name, argument) != ("measured", "n"):
                 check_same(where, name, argument, hint, types[argument])
     for argument, hint in {**types, "outputs": outputs}.items():
-        takes = [name for name, found in hints.items() if argument in (name, *found)]
+        takes = [name for name, own in hints.items() if argument in (name, *own)]
         if argument in _CLASSES.values() and not is_record(hint):
             why = f"{argument} of the type {word(form(hint))}; write a NamedTuple"
             raise Misdeclared(f"{where}.{takes[0]} takes {why}", takes[0], argument)
@@ -184,11 +184,11 @@ def _check_constants(where: str, behaviour: Behaviour) -> None:
 
 def seconds_in(names: Mapping[str, Any], name: str, default: Any) -> Any:
     """Read a constant that is a time, as a float."""
-    found = names.get(name, default)
-    is_number = isinstance(found, (float, int)) and not isinstance(found, bool)
-    if found is not default and not (is_number and isfinite(found) and found > 0):
-        raise Misdeclared(f"{name} is {found!r:.40}; write seconds, more than 0")
-    return found if found is None else float(found)
+    number = names.get(name, default)
+    is_number = isinstance(number, (float, int)) and not isinstance(number, bool)
+    if number is not default and not (is_number and isfinite(number) and number > 0):
+        raise Misdeclared(f"{name} is {number!r:.40}; write seconds, more than 0")
+    return number if number is None else float(number)
 
 
 def _hooks(module: ModuleType) -> dict[str, FunctionType]:
@@ -212,24 +212,24 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
     """Return the group of outputs that `measured` takes and returns; refuse unknown arguments."""
     groups = fields_of(outputs)
     noisy = [name for name in hints.get("measured", ()) if name in {*groups} - {*HOOKS["measured"]}]
-    for name, found in hints.items():
+    for name, types in hints.items():
         known = [*HOOKS[name], *(noisy if name == "measured" else ())]
-        for argument in (argument for argument in found if argument not in (*known, "return")):
+        for argument in (argument for argument in types if argument not in (*known, "return")):
             why = f"{argument}, which is not one of {', '.join(known)}"
             raise Misdeclared(f"{where}.{name} takes {why}", name, argument)
-        if "derived" in found and "derive" not in hints:
+        if "derived" in types and "derive" not in hints:
             raise Misdeclared(f"{where}.{name} takes derived, but there is no derive", name)
     if "measured" not in hints:
         return []
     if len(noisy) != 1:
         why = f"takes {len(noisy)} groups of outputs, not one"
         raise Misdeclared(f"{where}.measured {why}", "measured")
-    found = hints["measured"]
+    types = hints["measured"]
     for name in (*noisy, "return"):
-        check_same(where, "measured", name, found[name], groups[noisy[0]])
-    check_type(found.get("n", float), "measured", "n")
-    if "n" not in found or {*scalars_of(found["n"])} != {float}:
-        drawn = word(form(found["n"])) if "n" in found else "nothing"
+        check_same(where, "measured", name, types[name], groups[noisy[0]])
+    check_type(types.get("n", float), "measured", "n")
+    if "n" not in types or {*scalars_of(types["n"])} != {float}:
+        drawn = word(form(types["n"])) if "n" in types else "nothing"
         why = f"takes {drawn} as n; write a float, or a tuple or Vector of them"
         raise Misdeclared(f"{where}.measured {why}", "measured", "n")
     return noisy
@@ -237,12 +237,12 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
 
 def _types_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return the type of each argument: the one that most hooks declare."""
-    found: dict[str, list[Any]] = {}
+    forms_of: dict[str, list[Any]] = {}
     for name, hint in hints.items():
         pairs = [(argument, argument) for argument in _GROUPS if argument in hint]
         for group, place in [*pairs, *([(_SAME[name], "return")] if name in _SAME else [])]:
-            found.setdefault(group, []).append(form(hint[place]))
-    types = {name: max(forms, key=forms.count) for name, forms in found.items()}
+            forms_of.setdefault(group, []).append(form(hint[place]))
+    types = {name: max(forms, key=forms.count) for name, forms in forms_of.items()}
     return {**types, **_ARGUMENTS}
 
 
@@ -279,7 +279,7 @@ def _names_in(code: CodeType) -> Iterator[str]:
 def _message(where: str, text: Any) -> str:
     """Return the text `RESTARTED`; refuse one that only Python could format."""
     try:
-        fields = [found[1:] for found in Formatter().parse(text) if found[1] is not None]
+        fields = [part[1:] for part in Formatter().parse(text) if part[1] is not None]
         good = [
             name == "t" and conversion is None and (not form or NUMBER_FORMAT.fullmatch(form))
             for name, form, conversion in fields

@@ -57,8 +57,8 @@ class Model:
     @property
     def identifier(self) -> str:
         """The name of its library, which is valid in C."""
-        found = re.sub(r"\W", "_", self.name, flags=re.ASCII)
-        return found if found[:1].isalpha() else f"of_{found}"
+        name = re.sub(r"\W", "_", self.name, flags=re.ASCII)
+        return name if name[:1].isalpha() else f"of_{name}"
 
     @property
     def about(self) -> dict[str, str]:
@@ -136,20 +136,20 @@ def _fed_through(
 ) -> Iterator[Port]:
     """Yield the outputs, with dependencies on ports in place of fields of the inputs."""
     names = {field: [port.name for port in ports] for field, ports in inputs.items()}
-    names |= {name: [name] for found in [*names.values()] for name in found}
+    names |= {name: [name] for own in [*names.values()] for name in own}
     names[TIME.name] = [TIME.name]
     for field, ports in outputs.items():
         for port in ports:
             place = (behaviour.outputs.__name__, field)
-            for one in (*port.feedthrough, *(port.initially or ())):
-                if one not in names:
-                    why = f"depends on {one!r}; there are {', '.join(names)}"
+            for dependency in (*port.feedthrough, *(port.initially or ())):
+                if dependency not in names:
+                    why = f"depends on {dependency!r}; there are {', '.join(names)}"
                     raise Misdeclared(f"{'.'.join(place)} {why}", *place)
-            direct = tuple(name for one in port.feedthrough for name in names[one])
+            direct = tuple(name for dependency in port.feedthrough for name in names[dependency])
             if behaviour.is_sampled and not {*direct} - {TIME.name}:
                 why = "is sampled with the inputs, so it has feedthrough; leave out feedthrough=()"
                 raise Misdeclared(f"{'.'.join(place)} {why}", *place)
-            initial = (name for one in port.initially or () for name in names[one])
+            initial = (name for dependency in port.initially or () for name in names[dependency])
             yield replace(
                 port,
                 variability="discrete" if behaviour.is_sampled else port.variability,

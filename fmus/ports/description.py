@@ -186,9 +186,13 @@ def _log_categories(fmi: str) -> Element:
     return categories
 
 
-def _default_experiment(one: DefaultExperiment) -> Element:
+def _default_experiment(experiment: DefaultExperiment) -> Element:
     """Write the default experiment."""
-    times = {"startTime": one.start, "stopTime": one.stop, "stepSize": one.step}
+    times = {
+        "startTime": experiment.start,
+        "stopTime": experiment.stop,
+        "stepSize": experiment.step,
+    }
     return Element("DefaultExperiment", {name: str(time) for name, time in times.items()})
 
 
@@ -326,14 +330,14 @@ def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]
     names = {port.name: port.array.name if port.array else port.name for port in ports}
     keyed = [(names[port.name], place, port) for place, port in enumerate(ports, start=1)]
     variables = []
-    for name, found in groupby(keyed, itemgetter(0)):
-        members = [*found]
+    for name, group in groupby(keyed, itemgetter(0)):
+        members = [*group]
         _, reference, first = members[0]
         elements = [port for _, _, port in members]
         described = first.array.description if first.array else first.description
         direct = tuple(_names(names, (name for port in elements for name in port.feedthrough)))
         initial = _names(names, (name for port in elements for name in port.initially or ()))
-        later = tuple(one for one in initial if one not in direct)
+        later = tuple(variable for variable in initial if variable not in direct)
         whole = replace(
             first,
             name=name,
@@ -345,9 +349,9 @@ def variables_of(ports: Sequence[Port], arrays: bool = False) -> list[_Variable]
     return variables
 
 
-def _names(names: Mapping[str, str], found: Iterable[str]) -> dict[str, None]:
+def _names(names: Mapping[str, str], scalars: Iterable[str]) -> dict[str, None]:
     """Return the names of variables for names of scalars, each once."""
-    return dict.fromkeys(names.get(one, one) for one in found)
+    return dict.fromkeys(names.get(name, name) for name in scalars)
 
 
 def _variables(variables: Sequence[_Variable]) -> Element:
@@ -355,7 +359,9 @@ def _variables(variables: Sequence[_Variable]) -> Element:
     for reference, port, elements in variables:
         attributes = {**_variable_attributes(reference, port), **value_attributes(port)}
         if port.start is not None:
-            attributes["start"] = " ".join(value_attributes(one)["start"] for one in elements)
+            attributes["start"] = " ".join(
+                value_attributes(element)["start"] for element in elements
+            )
         variable = SubElement(root, TYPES[port.type], attributes)
         for size in port.array.shape if port.array else ():
             SubElement(variable, "Dimension", start=str(size))
@@ -364,7 +370,12 @@ def _variables(variables: Sequence[_Variable]) -> Element:
 
 def _structure_3(variables: Sequence[_Variable]) -> Element:
     """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
-    outputs = [*dependencies([one.port for one in variables], [one.reference for one in variables])]
+    outputs = [
+        *dependencies(
+            [variable.port for variable in variables],
+            [variable.reference for variable in variables],
+        )
+    ]
     structure = Element("ModelStructure")
     for name, on in (("Output", "direct"), ("InitialUnknown", "initial")):
         for output in outputs:

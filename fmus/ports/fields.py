@@ -97,23 +97,23 @@ def _wrong(place: tuple[str, ...], why: str) -> Misdeclared:
 
 def _prefix(notes: tuple[Any, ...], field: str, place: tuple[str, ...]) -> str:
     """Return the prefix of names for the fields of a NamedTuple that is a field itself."""
-    found = [note for note in notes if isinstance(note, Variable)]
-    if found and found != [Variable(name=found[0].name)]:
+    variables = [note for note in notes if isinstance(note, Variable)]
+    if variables and variables != [Variable(name=variables[0].name)]:
         raise _wrong(place, "is a NamedTuple, and its Variable may have only a name")
-    name = found[0].name if found else None
+    name = variables[0].name if variables else None
     return f"{field}." if name is None else f"{name}." if name else ""
 
 
 def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner: Any) -> Variable:
     """Return the Variable of a field, with its members; refuse an invalid one."""
-    found = [note for note in notes if isinstance(note, Variable)]
-    if len(found) != 1:
+    variables = [note for note in notes if isinstance(note, Variable)]
+    if len(variables) != 1:
         example = f'{place[-1]}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
         raise _wrong(place, f"has no unit and no description; write {example}")
-    [variable] = found
-    for name, of in _ONLY.items():
-        if getattr(variable, name) not in (None, False) and causality != of:
-            raise _wrong(place, f"is no {of}, and {name} is for {of}s")
+    [variable] = variables
+    for name, role in _ONLY.items():
+        if getattr(variable, name) not in (None, False) and causality != role:
+            raise _wrong(place, f"is no {role}, and {name} is for {role}s")
     if causality == "output" and (variable.minimum, variable.maximum) != (None, None):
         raise _wrong(place, "is an output; minimum and maximum are for inputs and parameters")
     for name in ("feedthrough", "initially"):
@@ -265,7 +265,7 @@ def _fmi_type(part: _Part, place: tuple[str, ...]) -> tuple[str, Any, dict[str, 
     start = members[0] if start is None else start
     if not isinstance(start, number):
         raise _wrong(place, f"starts with {start!r:.40}, which is no {number.__name__}")
-    choices = {one.name.lower(): one for one in members}
+    choices = {member.name.lower(): member for member in members}
     if len(choices) < len(members):
         raise _wrong(place, f"has choices of {number.__name__} that differ only in capitals")
     return "Enumeration", int(start), choices

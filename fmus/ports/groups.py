@@ -31,14 +31,14 @@ class Nothing(NamedTuple):
 
 def slices(ports: Sequence[Port]) -> dict[str, slice]:
     """Return the slice of each group of neighbouring ports among their values."""
-    found: dict[str, slice] = {}
+    slices: dict[str, slice] = {}
     start = 0
     for group, members in groupby(ports, lambda port: group_name(port.name)):
-        if group in found:
+        if group in slices:
             raise TypeError(f"the ports of {group} are not neighbours")
-        found[group] = slice(start, start + len(list(members)))
-        start = found[group].stop
-    return found
+        slices[group] = slice(start, start + len(list(members)))
+        start = slices[group].stop
+    return slices
 
 
 def hints_of(owner: Any) -> dict[str, Any]:
@@ -209,7 +209,9 @@ def unpacking(made: type[T], ports: Sequence[Port]) -> Callable[[Sequence[Value]
         nothing = made()
         return lambda values: nothing
     names = [f"x{i}" for i in range(len(ports))]
-    ordered = [name for name, _ in sorted(zip(names, ports), key=lambda one: one[1].type != "Real")]
+    ordered = [
+        name for name, _ in sorted(zip(names, ports), key=lambda pair: pair[1].type != "Real")
+    ]
     scope = {**SCOPE}
     result = gathered(made, iter(names), scope)
     return compiled("values", f"({', '.join(ordered)},) = values\n return {result}", scope)
@@ -241,7 +243,9 @@ def packed(given: Any, groups: Mapping[str, str]) -> str:
     """
     hints = hints_of(given)
     texts = [pair for name, text in groups.items() for pair in scattered(hints[name], text)]
-    return f"[{', '.join(text for text, _ in sorted(texts, key=lambda it: it[1] is not float))}]"
+    return (
+        f"[{', '.join(text for text, _ in sorted(texts, key=lambda pair: pair[1] is not float))}]"
+    )
 
 
 def scattered(hint: Any, text: str) -> Iterator[tuple[str, Any]]:

@@ -70,7 +70,7 @@ class Reducer:
 
 def is_reducer(module: ModuleType) -> bool:
     """Return True if a module has what only an index has."""
-    hooks = [one for name, one in vars(module).items() if name in HOOKS and callable(one)]
+    hooks = [hook for name, hook in vars(module).items() if name in HOOKS and callable(hook)]
     taken = {argument for hook in hooks for argument in getattr(hook, "__annotations__", ())}
     return "LAST" in vars(module) or bool(taken & {"before", "acting", "begin", "end"})
 
@@ -110,8 +110,8 @@ def read_reducer(module: ModuleType) -> Reducer:
 
 def _results(outputs: Any) -> dict[str, tuple[Port, ...]]:
     """Return the outputs by their fields; refuse those that cannot be indices."""
-    found = declared(outputs, "output")
-    for field, ports in found.items():
+    ports_of = declared(outputs, "output")
+    for field, ports in ports_of.items():
         place = (outputs.__name__, field)
         if is_record(class_of(fields_of(outputs)[field])) or any(p.type != "Real" for p in ports):
             why = "is not a float, or a tuple or Vector of them, as every index is"
@@ -120,26 +120,28 @@ def _results(outputs: Any) -> dict[str, tuple[Port, ...]]:
             if group_name(port.name) != field:
                 why = f"is called {port.name}; an index has the name of its field"
                 raise Misdeclared(f"{'.'.join(place)} {why}", *place)
-    return found
+    return ports_of
 
 
 def _meaning(outputs: Any, field: str) -> str:
-    [variable] = (one for one in split(fields_of(outputs)[field])[1] if isinstance(one, Variable))
+    [variable] = (
+        note for note in split(fields_of(outputs)[field])[1] if isinstance(note, Variable)
+    )
     return str(variable.description)
 
 
 def _types(where: str, hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Return the types of inputs, state and outputs; refuse hooks that contradict each other."""
-    rows = [hint for found in hints.values() for name, hint in found.items() if name in ROWS]
-    states = [found["state"] for found in hints.values() if "state" in found]
+    rows = [hint for own in hints.values() for name, hint in own.items() if name in ROWS]
+    states = [own["state"] for own in hints.values() if "state" in own]
     states += [hints[name]["return"] for name in ("start", "update")]
     types = {
         "inputs": _usual(rows) if rows else Nothing,
         "state": _usual(states),
         "outputs": hints["outputs"]["return"],
     }
-    for name, found in hints.items():
-        for argument, hint in found.items():
+    for name, own in hints.items():
+        for argument, hint in own.items():
             if argument == "return":
                 wanted = types["outputs" if name == "outputs" else "state"]
             elif argument not in HOOKS[name]:

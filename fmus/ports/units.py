@@ -119,17 +119,17 @@ def unit_of(text: str) -> Unit:
         factor, exponents = _OTHERS[text]
         return Unit(name, exponents, factor, _OFFSETS[text])
     factor, exponents = 1.0, {}
-    divisors = [brackets or one for brackets, one in _DIVIDED.findall(text)]
+    divisors = [brackets or divisor for brackets, divisor in _DIVIDED.findall(text)]
     product = _DIVIDED.sub("", text)
     if divisors and not text.startswith(f"{product}/"):
         return Unit(name)  # a / b.c is ambiguous
     for factors, sign in ((product, 1), *((divisor, -1) for divisor in divisors)):
-        for one in factors.split("."):
-            found = _FACTOR.fullmatch(one)
-            known = _symbol(found[1]) if found else None
-            if found is None or known is None:
+        for part in factors.split("."):
+            match = _FACTOR.fullmatch(part)
+            known = _symbol(match[1]) if match else None
+            if match is None or known is None:
                 return Unit(name)
-            power = sign * int(found[2] or 1)
+            power = sign * int(match[2] or 1)
             factor *= known[0] ** power
             for base, exponent in known[1].items():
                 exponents[base] = exponents.get(base, 0) + power * exponent

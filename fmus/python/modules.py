@@ -44,9 +44,9 @@ def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dic
         root = _root(name.partition(".")[0], packages, own)
         within = places.get(parent, () if parent or root is None else [str(root)])
         # Search for the last part only: Python would import the packages before it.
-        found = PathFinder.find_spec(last, [*within])
-        places[name] = [*((found and found.submodule_search_locations) or ())]
-        file = Path(found.origin) if found and found.origin else None
+        spec = PathFinder.find_spec(last, [*within])
+        places[name] = [*((spec and spec.submodule_search_locations) or ())]
+        file = Path(spec.origin) if spec and spec.origin else None
         if root is None or file is None or root not in file.parents:
             return
         files[file.relative_to(root).as_posix()] = file
@@ -61,7 +61,7 @@ def modules_of(text: str, packages: Mapping[str, Path], own: Path | None) -> dic
             # A star may stand for any module of the package.
             package = name[:-2]
             for place in places.get(package, ()):
-                wanted += (f"{package}.{it.stem}" for it in sorted(Path(place).glob("*.py")))
+                wanted += (f"{package}.{path.stem}" for path in sorted(Path(place).glob("*.py")))
         elif name not in places:
             wanted += imported_by(name)
     return files
@@ -74,8 +74,8 @@ def _root(top: str, packages: Mapping[str, Path], own: Path | None) -> Path | No
     if own is None or top in sys.builtin_module_names:
         return None
     # A package elsewhere comes before a folder without __init__.py.
-    found = PathFinder.find_spec(top, [str(own), *sys.path])
-    places = [*(found.submodule_search_locations or (found.origin,))] if found else []
+    spec = PathFinder.find_spec(top, [str(own), *sys.path])
+    places = [*(spec.submodule_search_locations or (spec.origin,))] if spec else []
     return own if any(place and Path(place).parent == own for place in places) else None
 
 
@@ -132,14 +132,16 @@ def with_other_imports(content: bytes, names: Collection[str], suffix: str) -> b
     """
     text, added = decode_source(content).encode(), suffix.encode()
     changed = text
-    for one in reversed(_imports(text)):
-        if one.top not in names:
+    for imported in reversed(_imports(text)):
+        if imported.top not in names:
             continue
-        if one.bound and one.is_within:
-            more = b", " + one.bound + added + b" as " + one.bound
-            changed = changed[: one.whole_end] + more + changed[one.whole_end :]
-        name = added + (b" as " + one.bound if one.bound and not one.is_within else b"")
-        changed = changed[: one.end] + name + changed[one.end :]
+        if imported.bound and imported.is_within:
+            more = b", " + imported.bound + added + b" as " + imported.bound
+            changed = changed[: imported.whole_end] + more + changed[imported.whole_end :]
+        name = added + (
+            b" as " + imported.bound if imported.bound and not imported.is_within else b""
+        )
+        changed = changed[: imported.end] + name + changed[imported.end :]
     if changed == text:
         return content
     encoding, _ = tokenize.detect_encoding(io.BytesIO(content).readline)
@@ -155,18 +157,18 @@ def _imports(text: bytes) -> list[_Import]:
     begins = [0]
     for line in text.split(b"\n"):
         begins.append(begins[-1] + len(line) + 1)
-    found = []
+    imports = []
     for node in ast.walk(ast.parse(text.decode())):
         if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             keyword = _FROM.match(text, begins[node.lineno - 1] + node.col_offset)
             name = keyword and _NAME.match(text, keyword.end())
             assert name
-            found.append(_Import(node.module.partition(".")[0], name.end()))
+            imports.append(_Import(node.module.partition(".")[0], name.end()))
         for alias in node.names if isinstance(node, ast.Import) else ():
             name = _NAME.match(text, begins[alias.lineno - 1] + alias.col_offset)
             assert name and alias.end_lineno is not None and alias.end_col_offset is not None
             top, _, others = alias.name.partition(".")
             end = begins[alias.end_lineno - 1] + alias.end_col_offset
             bound = b"" if alias.asname else name[0]
-            found.append(_Import(top, name.end(), bound, bool(others), end))
-    return sorted(found, key=lambda one: one.end)
+            imports.append(_Import(top, name.end(), bound, bool(others), end))
+    return sorted(imports, key=lambda imported: imported.end)

@@ -111,7 +111,9 @@ _ADVANCE = ("state", "derived", "inputs", "t", "h", "n")
 def _made_of(behaviour: Behaviour, *hooks: str) -> frozenset[str]:
     """Return the arguments that the results of hooks depend on."""
     known = ("inputs", "parameters", "t", "state")
-    return frozenset(one for one in known if any(behaviour.takes(hook, one) for hook in hooks))
+    return frozenset(
+        argument for argument in known if any(behaviour.takes(hook, argument) for hook in hooks)
+    )
 
 
 def _method(name: str, arguments: tuple[str, ...], lines: Iterator[str] | list[str]) -> str:

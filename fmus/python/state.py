@@ -102,8 +102,8 @@ class Store:
         self.outputs = self.no_outputs()
         self.places = {
             reference: place
-            for found in (self.input_references, self.output_references)
-            for place, reference in enumerate(found)
+            for references in (self.input_references, self.output_references)
+            for place, reference in enumerate(references)
         }
         self.parameters: dict[str, Value] = {
             port.name: port.start

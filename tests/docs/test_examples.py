@@ -114,8 +114,8 @@ def test_tests_of_one_fmu_pass_as_the_page_says(native, workplace):
     Path("test_observer.py").write_text(code.text)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "test_observer.py"]
     ended = subprocess.run(command, capture_output=True, text=True, check=False)
-    [said] = blocks(TEST_ONE, "text")
-    assert said.text.strip() in ended.stdout
+    [block] = blocks(TEST_ONE, "text")
+    assert block.text.strip() in ended.stdout
 
 
 def test_example_of_a_component_is_built_verified_and_run(workplace):
@@ -236,19 +236,19 @@ def test_paths_of_the_plants_schemes_are_as_far_apart_as_the_page_says(name):
         true_control_point(simulate(name, values, kind="native"))
         for values in (QUIET, RK4, {**RK4, "plant.h_max": 0.002})
     )
-    said = said_of_accuracy(f"`{name}`")[0].split("; ")[0]
+    cell = said_of_accuracy(f"`{name}`")[0].split("; ")[0]
     away = np.linalg.norm(euler - exact, axis=1).max()
-    assert away == pytest.approx(float(said.removesuffix(" cm")) / 100, rel=0.05)
+    assert away == pytest.approx(float(cell.removesuffix(" cm")) / 100, rel=0.05)
     assert np.linalg.norm(rk4 - exact, axis=1).max() < 1e-6
 
 
 def test_effort_of_the_pd_controller_belongs_to_the_plants_scheme_as_the_page_says():
-    said = said_of_accuracy("`fig5-pd`", "L2 q")
+    cells = said_of_accuracy("`fig5-pd`", "L2 q")
     found = [
         simulate("fig5-pd", values, kind="native").metrics()["l2_effort"][1]
         for values in (QUIET, RK4)
     ]
-    assert [f"{effort:.3g}" for effort in found] == [said[0], said[-1]] == ["166", "133"]
+    assert [f"{effort:.3g}" for effort in found] == [cells[0], cells[-1]] == ["166", "133"]
 
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")

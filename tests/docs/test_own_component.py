@@ -83,9 +83,9 @@ def test_page_of_the_form_names_all_of_it():
 @pytest.fixture(scope="session")
 def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A folder in which everything on the page was done, and the output."""
-    folder, said = tmp_path_factory.mktemp("component"), io.StringIO()
+    folder, output = tmp_path_factory.mktemp("component"), io.StringIO()
     before = [*sys.path]
-    with pytest.MonkeyPatch.context() as here, redirect_stdout(said):
+    with pytest.MonkeyPatch.context() as here, redirect_stdout(output):
         here.chdir(folder)
         # An example has that name, too.
         here.delitem(sys.modules, "pid", raising=False)
@@ -105,7 +105,7 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     # Others have components of this name, too.
     sys.path[:] = before
     sys.modules.pop("pid", None)
-    return folder, said.getvalue()
+    return folder, output.getvalue()
 
 
 def test_both_kinds_give_the_same_table(followed: tuple[Path, str]):
@@ -120,7 +120,7 @@ def test_both_kinds_give_the_same_table(followed: tuple[Path, str]):
 
 def test_other_hosts_give_the_same_numbers(followed: tuple[Path, str]):
     """In fmpy; the table on the page has the deviations of other hosts."""
-    folder, said = followed
+    folder, output = followed
     rows = [
         fmpy.simulate_fmu(
             str(path), stop_time=10.0, step_size=0.02, output_interval=0.02,
@@ -137,9 +137,9 @@ def test_other_hosts_give_the_same_numbers(followed: tuple[Path, str]):
         # A sampled component holds its outputs after a step, and fmpy reads them then.
         np.testing.assert_allclose(row, [table[0], *table[:-1]], rtol=1e-12)
     if all(map(find_spec, EXTRAS[" hosts "])):
-        lines = [line.split() for line in said.splitlines()]
+        lines = [line.split() for line in output.splitlines()]
         found = {words[0]: words for words in lines if words[:1] and "0.0e+00" in words}
-        assert found.keys() >= {"libcosim-ssp", "ecos", "fmpy"}, said
+        assert found.keys() >= {"libcosim-ssp", "ecos", "fmpy"}, output
 
 
 @pytest.mark.slow

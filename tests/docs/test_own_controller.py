@@ -174,9 +174,9 @@ def test_mistake_in_the_first_step_is_the_only_message(workplace, capsys):
     line = built_with("        value = self.values\n", "        value = self.valu\n")
     capsys.readouterr()
     assert main(["run", "my_law.toml", "--out", "out"]) == 1
-    told = capsys.readouterr()
-    assert told.out == f"written to out{os.sep}\n"
-    [complaint] = told.err.splitlines()
+    output = capsys.readouterr()
+    assert output.out == f"written to out{os.sep}\n"
+    [complaint] = output.err.splitlines()
     assert f"my_law.py:{line}: AttributeError: " in complaint
     assert "Fatal" not in complaint
 

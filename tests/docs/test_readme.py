@@ -171,29 +171,37 @@ def claims() -> str:
 
 def test_every_number_of_readme_is_in_words_that_runs_show():
     text = claims()
-    for said in SAID:
-        assert said.words in f"{text} ", said.words
-        text = text.replace(said.words.strip(), "")
+    for statement in SAID:
+        assert statement.words in f"{text} ", statement.words
+        text = text.replace(statement.words.strip(), "")
     # Names of things, and what the columns are.
     for name in ("1,000 draws", "noise of 1 mm", "u, q, r in Fig. 5", "Theorem 1", "section 4"):
         text = text.replace(name, "")
     assert not numbers_in(text), text
 
 
-@pytest.mark.parametrize("said", [said for said in SAID if said.quiet], ids=lambda said: said.words)
-def test_readme_is_true_without_noise(said: Said):
-    assert said.quiet and said.quiet()
+@pytest.mark.parametrize(
+    "statement",
+    [statement for statement in SAID if statement.quiet],
+    ids=lambda statement: statement.words,
+)
+def test_readme_is_true_without_noise(statement: Said):
+    assert statement.quiet and statement.quiet()
 
 
 @pytest.mark.parametrize("seeds", [range(1, 3), *slow(range(3, 23))])
-@pytest.mark.parametrize("said", [said for said in SAID if said.draw], ids=lambda said: said.words)
-def test_readme_is_true_in_every_draw_of_the_noise(said: Said, seeds: range):
-    assert said.draw and [seed for seed in seeds if not said.draw(seed)] == []
+@pytest.mark.parametrize(
+    "statement",
+    [statement for statement in SAID if statement.draw],
+    ids=lambda statement: statement.words,
+)
+def test_readme_is_true_in_every_draw_of_the_noise(statement: Said, seeds: range):
+    assert statement.draw and [seed for seed in seeds if not statement.draw(seed)] == []
 
 
 def rows() -> dict[str, list[str]]:
     """Table of peaks on the page, by figure."""
-    [table] = [one for one in sections(PAGE) if one.header[0] == "figure"]
+    [table] = [part for part in sections(PAGE) if part.header[0] == "figure"]
     return {row[0]: row[1:] for row in table.rows}
 
 
@@ -214,12 +222,12 @@ def test_table_of_peaks_is_what_runs_give(figure: str):
     quiet, median, largest, draws, share = rows()[figure]
     name, gains = scenario_of(figure)
     found = [metrics(name, seed, **gains) for seed in range(5)]
-    peaks = np.array([one["peak_command"] for one in found])
+    peaks = np.array([indices["peak_command"] for indices in found])
     # From 100 m away, what PD commands is chaotic.
     assert peaks[0] == pytest.approx(values(quiet), rel=0.02 if name == "fig6-pd" else 5e-3)
     assert np.median(peaks[1:], axis=0) == pytest.approx(values(median), rel=0.1)
     assert (peaks[1:] <= np.multiply(1.01, values(largest))).all()
-    shares = [100 * max(one["saturated_fraction"]) for one in found[1:]]
+    shares = [100 * max(indices["saturated_fraction"]) for indices in found[1:]]
     [most] = values(share) or [0.0]
     assert max(shares) <= 1.01 * most
     assert draws != "none" or not any(shares)

@@ -51,7 +51,7 @@ def fmu(shared: Path) -> Callable[..., Path]:
 def outputs(path: Path) -> list[str]:
     """Names of the outputs of an FMU, without `fault`."""
     variables = fmpy.read_model_description(str(path)).modelVariables
-    names = [one.name for one in variables if one.causality == "output"]
+    names = [variable.name for variable in variables if variable.causality == "output"]
     return [name for name in names if name != FAULT.name]
 
 
@@ -82,7 +82,7 @@ def test_both_kinds_are_valid_and_give_the_bits_of_plain_python(fmu, name: str):
 def test_fmi3_is_valid_and_gives_the_same_bits(fmu, name: str):
     path = fmu(name, NATIVE, "3")
     assert validate_fmu(str(path)) == []
-    older, newer = (rows(one) for one in (fmu(name, NATIVE), path))
+    older, newer = (rows(file) for file in (fmu(name, NATIVE), path))
     for port in outputs(fmu(name, NATIVE)):
         # Enumerations have 64 bits in FMI 3.0.
         found = newer[port].astype(older[port].dtype)

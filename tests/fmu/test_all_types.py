@@ -67,9 +67,9 @@ class Run:
         self.saved: list[int] = []
 
     def note(self, status: Status, *more: Any) -> Status:
-        said = [(message.status, _LINE.sub("", message.text)) for message in self.host.messages]
+        messages = [(message.status, _LINE.sub("", message.text)) for message in self.host.messages]
         self.host.messages.clear()
-        self.answers.append((status, said, *map(bits, more)))
+        self.answers.append((status, messages, *map(bits, more)))
         return status
 
     def references(self, names: Sequence[str]) -> list[int]:
@@ -115,7 +115,7 @@ class Run:
 
 def both(folder: Path, variant: str) -> Sequence[Library]:
     """A variant whose outputs are computed at other times, in Python and in C."""
-    made = build.native(folder / variant, of=build.definition(variant))
+    made = build.native(folder / variant, component=build.definition(variant))
     return Library(build.python(folder / f"{variant}_python", variant)), Library(made)
 
 
@@ -150,10 +150,10 @@ def stepping(libraries) -> Iterator[list[Run]]:
 
 def answers_agree(runs: Sequence[Run]) -> None:
     """Compare all answers of both kinds; FMI 3.0 has other words in some messages."""
-    one, other, *third = (run.answers for run in runs)
-    assert one == other
+    first, second, *third = (run.answers for run in runs)
+    assert first == second
     for answers in third:
-        assert [(status, *values) for status, _, *values in one] == [
+        assert [(status, *values) for status, _, *values in first] == [
             (status, *values) for status, _, *values in answers
         ]
 
@@ -194,8 +194,8 @@ def test_integer_that_leaves_32_bits_discards_the_step(stepping):
             run.set_all("Integer", {"pair[1]": n})
             assert run.step() == (Status.Discard if n == MOST else Status.OK)
             run.look()
-        said = [text for _, said, *_ in run.answers for _, text in said]
-        assert said == ["step refused at t = 0 s: OverflowError: an integer exceeds 32 bits"]
+        texts = [text for _, messages, *_ in run.answers for _, text in messages]
+        assert texts == ["step refused at t = 0 s: OverflowError: an integer exceeds 32 bits"]
     answers_agree(stepping)
 
 
@@ -222,7 +222,7 @@ def test_wild_state_is_restarted_with_its_derived_values(stepping):
         run.set("Real", u=1e9)
         assert run.step() == run.step() == run.step() == Status.OK
         run.look()
-        assert any("x was wild" in text for _, said, *_ in run.answers for _, text in said)
+        assert any("x was wild" in text for _, messages, *_ in run.answers for _, text in messages)
     answers_agree(stepping)
 
 
@@ -247,8 +247,8 @@ def test_values_that_no_port_takes_are_refused_as_a_whole(stepping, kind, values
         before = run.look()
         assert run.set_all(kind, values) == status
         assert {**run.look(), "fault": 0} == before
-    [(said, text)] = stepping[0].answers[-2][1]
-    assert said == status and text.startswith(why)
+    [(level, text)] = stepping[0].answers[-2][1]
+    assert level == status and text.startswith(why)
     answers_agree(stepping)
 
 
@@ -326,7 +326,7 @@ def test_scalars_are_groups_of_their_own_with_noise_and_ranges(tmp_path, monkeyp
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
-    library = Library(build.native(tmp_path / "native", of=define("Scalars", module)))
+    library = Library(build.native(tmp_path / "native", component=define("Scalars", module)))
     with initialised(library) as host:
         for t, values in enumerate(([3.0, -1.0, 0.5], [3.0, -9.0, 9.0], [8.5, 0.0, 0.0])):
             slave.set_real([0, 1, 2], values)
@@ -337,8 +337,8 @@ def test_scalars_are_groups_of_their_own_with_noise_and_ranges(tmp_path, monkeyp
             _, got = host.get("Real", [3, 4])
             assert [*map(bits, got)] == [*map(bits, slave.get_real([3, 4]))]
             assert host.get("Integer", [5])[1] == slave.get_integer([5]) == [3000]
-        [said] = host.messages
-    assert messages_of(slave) == [said.text] == ["u = 8.5: must be at most 8"]
+        [message] = host.messages
+    assert messages_of(slave) == [message.text] == ["u = 8.5: must be at most 8"]
 
 
 MEMBERS = """\
@@ -392,7 +392,7 @@ def test_an_int_may_be_a_member_or_a_truth_value_but_a_member_no_other_int(tmp_p
     slave.setup_experiment(0.0)
     slave.enter_initialization_mode()
     slave.exit_initialization_mode()
-    library = Library(build.native(tmp_path / "native", of=define("Members", module)))
+    library = Library(build.native(tmp_path / "native", component=define("Members", module)))
     with initialised(library) as host:
         for t, k in enumerate((0, 3, 1, 2, 0)):
             for state in (slave._get_fmu_state(), from_bytes(to_bytes(slave._get_fmu_state()))):
@@ -404,7 +404,7 @@ def test_an_int_may_be_a_member_or_a_truth_value_but_a_member_no_other_int(tmp_p
             steps = slave.do_step(t, 1.0), host.step(t, 1.0) == Status.OK
             assert steps == ((False, False) if k == 1 else (True, True))
         texts = {"step refused at t = 2 s: ValueError: 5 is not a valid Mode"}
-        assert {*messages_of(slave)} == {said.text for said in host.messages} == texts
+        assert {*messages_of(slave)} == {message.text for message in host.messages} == texts
 
 
 # Any calls
@@ -480,22 +480,24 @@ def test_both_kinds_answer_alike_whatever_is_called(variants, before, after):
 def test_run_continues_from_the_bytes_of_its_state(variants, first, then):
     for library in variants:
         with initialised(library) as host, initialised(library) as another:
-            one, other = Run(host), Run(another)
+            left, right = Run(host), Run(another)
             for call, *arguments in first:
-                getattr(one, call)(*arguments)
-            if any(status == Status.Error for status, *_ in one.answers):
+                getattr(left, call)(*arguments)
+            if any(status == Status.Error for status, *_ in left.answers):
                 continue  # it may be in the state error
             _, state = another.deserialised(host.content())
-            if other.note(another.set_state(state)) != Status.OK:
+            if right.note(another.set_state(state)) != Status.OK:
                 continue  # an earlier call has failed
-            other.time, other.answers, one.answers = one.time, [], []
+            right.time, right.answers, left.answers = left.time, [], []
             assert another.content() == host.content()
-            for run in (one, other):
+            for run in (left, right):
                 run.saved.clear()
                 for call, *arguments in then:
                     getattr(run, call)(*arguments)
                 run.look()
-            assert [answer[2:] for answer in one.answers] == [it[2:] for it in other.answers]
+            assert [answer[2:] for answer in left.answers] == [
+                answer[2:] for answer in right.answers
+            ]
 
 
 # States that no run has led to
@@ -503,13 +505,13 @@ def test_run_continues_from_the_bytes_of_its_state(variants, first, then):
 
 def changed(content: bytes, place: Sequence[Any], value: Any) -> bytes:
     """A state of the kind in Python with one other value."""
-    said = json.loads(content)
-    part = said
+    document = json.loads(content)
+    part = document
     for key in place[:-1]:
         part = part[key]
     part[place[-1]] = value
-    del said["checksum"]
-    return json.dumps({**said, "checksum": crc32(json.dumps(said).encode())}).encode()
+    del document["checksum"]
+    return json.dumps({**document, "checksum": crc32(json.dumps(document).encode())}).encode()
 
 
 @pytest.mark.parametrize(

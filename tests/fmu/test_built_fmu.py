@@ -260,7 +260,7 @@ def test_resources_need_nothing_but_an_old_standard_library(dist: Path, name: st
     imported = set()
     for entry, text in scripts.items():
         tree = ast.parse(text, filename=entry, feature_version=(3, 9))
-        unseen = [one for one in ast.walk(tree) if is_for_type_checkers(one)]
+        unseen = [node for node in ast.walk(tree) if is_for_type_checkers(node)]
         for node in set(ast.walk(tree)).difference(*map(ast.walk, unseen)):
             if isinstance(node, ast.Import):
                 imported |= {alias.name.split(".")[0] for alias in node.names}

@@ -88,12 +88,12 @@ def test_descriptions_are_valid(fmi2: Path, fmi3: Path):
 
 
 def test_both_kinds_say_the_same(python: ModelDescription, fmi2: Path):
-    one, other = everything(python), everything(read_model_description(str(fmi2)))
-    assert len(one["modelVariables"]) == len(ports_of(python.modelName)) + 1
-    for variable, twin in zip(one["modelVariables"], other["modelVariables"], strict=True):
+    first, second = everything(python), everything(read_model_description(str(fmi2)))
+    assert len(first["modelVariables"]) == len(ports_of(python.modelName)) + 1
+    for variable, twin in zip(first["modelVariables"], second["modelVariables"], strict=True):
         assert variable == twin
-    assert other.keys() == one.keys()
-    assert {key for key in other if other[key] != one[key]} == ITS_OWN
+    assert second.keys() == first.keys()
+    assert {key for key in second if second[key] != first[key]} == ITS_OWN
 
 
 def test_native_kind_tells_what_it_is(fmi2: Path):
@@ -122,16 +122,16 @@ def values_of(variable: dict[str, Any]) -> dict[str, Any]:
 
 
 def test_both_versions_have_the_same_variables(fmi2: Path, fmi3: Path):
-    one, other = (
+    older, newer = (
         everything(read_model_description(str(p)))["modelVariables"] for p in (fmi2, fmi3)
     )
-    *twins, time = other
+    *twins, time = newer
     assert (time["causality"], time["variability"], time["unit"], time["start"]) == (
         "independent", "continuous", "s", None
     )  # fmt: skip
     # In their order: some hosts take them for indices. Only in FMI 3.0 they begin at 1.
-    assert [v["valueReference"] for v in other] == [*range(1, len(other) + 1)]
-    for variable, twin in zip(one, twins, strict=True):
+    assert [v["valueReference"] for v in newer] == [*range(1, len(newer) + 1)]
+    for variable, twin in zip(older, twins, strict=True):
         reference = variable["valueReference"] + 1
         assert values_of({**variable, "valueReference": reference}) == values_of(twin)
 
@@ -146,9 +146,9 @@ def edges(description: ModelDescription, part: str) -> dict[str, set[str]]:
 
 @pytest.mark.parametrize("part", ["outputs", "initialUnknowns"])
 def test_both_versions_have_the_same_dependencies(fmi2: Path, fmi3: Path, part: str):
-    one, other = (edges(read_model_description(str(path)), part) for path in (fmi2, fmi3))
-    assert one
-    assert one == other
+    first, second = (edges(read_model_description(str(path)), part) for path in (fmi2, fmi3))
+    assert first
+    assert first == second
 
 
 def test_only_outputs_that_declare_the_time_depend_on_it(fmi3: Path):
@@ -234,9 +234,9 @@ def test_starts_and_bounds_are_the_declared_ones_and_can_be_set(
                 if port is None or variable.type != "Real" or variable.causality == "output":
                     continue
                 assert variable.start.hex() == float(port.start or 0.0).hex()
-                for read, said in (
+                for read, declared in (
                     (variable.minimum, port.minimum), (variable.maximum, port.maximum),
                 ):  # fmt: skip
-                    assert read == said
+                    assert read == declared
                     if read is not None:
                         assert host.set("Real", [variable.reference], [read]) == Status.OK

@@ -132,9 +132,9 @@ def entered(host: Host, start: float, has_stop: bool = False, stop: float = 0.0)
 
 def answer(host: Host, status: Status) -> str:
     """The answer to a call, from its status, the messages and the next step."""
-    said = [message.status for message in host.messages]
+    statuses = [message.status for message in host.messages]
     assert not host.fault()
-    assert said == ([] if status == Status.OK else [Status.Error])
+    assert statuses == ([] if status == Status.OK else [Status.Error])
     next_step = host.step(0.0, H)
     if status == Status.OK:
         assert next_step == Status.OK
@@ -186,14 +186,14 @@ def test_own_call(plant: Fmi3Library, key: tuple[str, str]):
 
 @pytest.mark.parametrize("key", CREATIONS, ids=": ".join)
 def test_own_creation(plant: Fmi3Library, key: tuple[str, str]):
-    said = []
-    logger = Logger(lambda environment, status, category, text: said.append(status))
+    statuses = []
+    logger = Logger(lambda environment, status, category, text: statuses.append(status))
     token = plant.description.guid.encode()
     before, after = CREATIONS[key]
     made = getattr(plant.own, key[0])(
         b"own", token, None, c_bool(False), c_bool(True), *before, logger, *after
     )
-    assert said == ([] if made else [Status.Error])
+    assert statuses == ([] if made else [Status.Error])
     plant.own.fmi3FreeInstance(c_void_p(made))
     assert fmi3_rows()[key] == ("instance" if made else "NULL")
 
@@ -301,8 +301,8 @@ def test_time_is_a_variable(plant: Fmi3Library):
     def now(host: Host) -> float:
         value = c_double()
         reference = byref(c_uint(plant.description.find("time").reference))
-        one = c_size_t(1)
-        assert call(host, "fmi3GetFloat64", reference, one, byref(value), one) == Status.OK
+        count = c_size_t(1)
+        assert call(host, "fmi3GetFloat64", reference, count, byref(value), count) == Status.OK
         return value.value
 
     with instance(plant) as host:
@@ -335,7 +335,7 @@ def test_categories_are_turned_on_and_off_one_by_one(unpacked: Path):
         n = c_size_t(len(names))
         assert call(host, "fmi3SetDebugLogging", c_bool(on), n, array) == Status.OK
 
-    def heard(host: Host) -> list[Status]:
+    def statuses_of(host: Host) -> list[Status]:
         assert host.call("fmi2Reset") == host.setup() == host.enter() == host.exit() == Status.OK
         host.messages.clear()
         host.set("Real", [measured], [5.0])
@@ -345,17 +345,17 @@ def test_categories_are_turned_on_and_off_one_by_one(unpacked: Path):
         return [message.status for message in host.messages]
 
     with instance(controller) as host:
-        assert heard(host) == [warning, discard, error]
+        assert statuses_of(host) == [warning, discard, error]
         choose(host, False, b"logStatusWarning")
-        assert heard(host) == [discard, error]
+        assert statuses_of(host) == [discard, error]
         choose(host, True, b"logStatusDiscard")
-        assert heard(host) == [discard, error]
+        assert statuses_of(host) == [discard, error]
         choose(host, True, b"logStatusWarning")
-        assert heard(host) == [warning, discard, error]
+        assert statuses_of(host) == [warning, discard, error]
         choose(host, False)
-        assert heard(host) == [error]
+        assert statuses_of(host) == [error]
         choose(host, True)
-        assert heard(host) == [warning, discard, error]
+        assert statuses_of(host) == [warning, discard, error]
 
 
 def test_messages_are_neither_formats_nor_names_of_variables(plant: Fmi3Library):

@@ -188,10 +188,10 @@ def test_folder_without_a_slave_is_null_with_one_message(python, resources, file
 def test_long_reason_is_cut_between_characters(python, resources):
     """Percent signs are doubled, as in all formats."""
     (resources / "slavemodule.txt").write_text("guarded_k")
-    said = "100 % %d %% " + "ü" * 2000
-    (resources / "guarded_k.py").write_text(f"raise ValueError({said!r})", encoding="utf-8")
+    why = "100 % %d %% " + "ü" * 2000
+    (resources / "guarded_k.py").write_text(f"raise ValueError({why!r})", encoding="utf-8")
     message = refused(python, location=resources.as_uri().encode())
-    whole = f"fmi2Instantiate: ValueError: {said}"
+    whole = f"fmi2Instantiate: ValueError: {why}"
     assert message.text == whole[:LONGEST_MESSAGE].replace("%", "%%")
 
 
@@ -286,9 +286,9 @@ def test_refusals_are_told_once_and_only_errors_with_logging_off(
     """Each in its call; a repeated one has the same answer and no message."""
     with initialised(of_any_version, logging=logging) as host:
         assert [call(host), call(host)] == [status] * 2
-        said = [(message.status, message.category) for message in host.messages]
+        logged = [(message.status, message.category) for message in host.messages]
         is_told = logging or status == ERROR
-        assert said == [(status, f"logStatus{status.name}")] * is_told
+        assert logged == [(status, f"logStatus{status.name}")] * is_told
         assert host.fault() is (status == Status.Discard)
         assert host.value(host.description.find("y.x")) == 0.0
 
@@ -486,7 +486,7 @@ def test_threads_that_make_instances_leave_the_process_as_it_was(
                 answers.append(host.step(0.0, 0.02))
             assert not Host(library).instantiate(guid=b"{0}", location=b"file:///nowhere")
 
-    at_once(*(partial(run, one) for one in 3 * (library, planner)))
+    at_once(*(partial(run, loaded) for loaded in 3 * (library, planner)))
     assert answers == [OK] * 60
     assert sys.path == before
 
@@ -586,13 +586,13 @@ def test_percent_signs_arrive_as_a_format_that_prints_them(foreign: Library):
 
 
 def test_categories_choose_messages_but_not_errors(foreign: Library):
-    for categories, heard in (([b"logStatusWarning"], 1), ([b"logEvents", b"x"], 0)):
+    for categories, expected in (([b"logStatusWarning"], 1), ([b"logEvents", b"x"], 0)):
         with instance(foreign, logging=False) as host:
             n = len(categories)
             chosen = (c_char_p * n)(*categories)
             assert host.call("fmi2SetDebugLogging", 1, c_size_t(n), chosen) == OK
             assert host.enter() == host.exit() == OK
-            assert len(host.messages) == heard
+            assert len(host.messages) == expected
             assert host.step(1.0, 0.1) == Status.Discard
             assert "foreign_slave.py:18: ValueError: not at one" in host.messages[-1].text
 

@@ -80,9 +80,9 @@ def test_host_that_ends_python_first_lets_its_instances_go_in_silence(dist, tmp_
     assert process.stdout.splitlines() == [
         "with Python 0", "ended 0", "step 3", "free state 3", "another none", "terminate 0",
     ]  # fmt: skip
-    told, silence = process.stderr.split("--\n")
+    messages, silence = process.stderr.split("--\n")
     ended = "the host has ended Python"
-    assert told.splitlines() == [
+    assert messages.splitlines() == [
         f"fmi2DoStep: {ended}",
         f"fmi2FreeFMUstate: {ended}",
         f"ended: logStatusError: fmi2Instantiate: {ended}",

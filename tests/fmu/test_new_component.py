@@ -81,16 +81,16 @@ def test_page_has_the_ports(tree: Path):
 
 def test_both_kinds_give_the_same_numbers_and_they_are_right(tree: Path):
     """The exponential, and the noise: 3,000 numbers with a deviation of 1 cm, up to 5 %."""
-    one, other = (
+    python, native = (
         fmpy.simulate_fmu(
             str(tree / f"dist/{kind}/{NAME}.fmu"), stop_time=30.0, step_size=0.01,
             output_interval=0.01, output=["x", "y"],
         )
         for kind in ("python", "native")
     )  # fmt: skip
-    assert one.tobytes() == other.tobytes()
-    np.testing.assert_allclose(one["x"], np.exp(-one["time"] / 0.5), rtol=1e-10)
-    noise = one["y"] - one["x"]
+    assert python.tobytes() == native.tobytes()
+    np.testing.assert_allclose(python["x"], np.exp(-python["time"] / 0.5), rtol=1e-10)
+    noise = python["y"] - python["x"]
     assert np.std(noise) == pytest.approx(0.01, rel=0.05)
     assert abs(np.mean(noise)) < 4.0 * 0.01 / np.sqrt(len(noise))
 

@@ -82,7 +82,7 @@ def table(refused: Refused) -> np.ndarray | None:
 @pytest.mark.parametrize(("kind", "case"), CASES)
 def test_fmpy_does_not_end_the_run_as_a_success(fmu, kind: str, case: str):
     refused = REFUSALS[case]
-    heard: list[str] = []
+    messages: list[str] = []
     with pytest.raises(FMICallException):
         fmpy.simulate_fmu(
             fmu(kind, refused.name),
@@ -92,11 +92,11 @@ def test_fmpy_does_not_end_the_run_as_a_success(fmu, kind: str, case: str):
             output_interval=refused.step,
             stop_time=refused.steps * refused.step,
             debug_logging=True,  # else only errors are logged
-            logger=lambda *arguments: heard.append(arguments[-1].decode()),
+            logger=lambda *arguments: messages.append(arguments[-1].decode()),
             # fmpy repeats a discarded step without end if the FMU lets it.
             timeout=60.0,
         )
-    assert refused.why in heard[-1]
+    assert refused.why in messages[-1]
 
 
 @pytest.mark.parametrize(("kind", "case"), CASES)
@@ -111,10 +111,10 @@ def test_our_master_fails_with_the_reason(fmu, kind: str, case: str):
             step=refused.step,
         )
     except ValueError as error:
-        said = str(error)  # refused before the run
+        message = str(error)  # refused before the run
     else:
-        said = result.failure or ""
-    assert refused.why in said
+        message = result.failure or ""
+    assert refused.why in message
 
 
 # By hand
@@ -161,17 +161,17 @@ def test_kinds_agree_on_the_largest_state_to_its_last_bit(fmu, tmp_path: Path):
     random, answers = Random(1), set()
     folders = [fmpy.extract(str(fmu(kind, "AuvPlant")), tmp_path / kind) for kind in KINDS]
     python, native = (Library(Path(folder)) for folder in folders)
-    with instance(python) as one, instance(native) as other:
+    with instance(python) as first, instance(native) as second:
         for _ in range(200):
             place = [random.uniform(0.5, 1.0) for _ in range(3)]
             scale = 1e100 / hypot(*place) * (1.0 + random.randint(-2, 2) * 2.0**-53)
             values = {f"eta0.{name}": x * scale for name, x in zip("xyz", place, strict=True)}
-            said = set()
-            for host in (one, other):
+            outcomes = set()
+            for host in (first, second):
                 host.call("fmi2Reset")
-                said.add(started(host, values) == Status.OK)
-            assert len(said) == 1, values
-            answers |= said
+                outcomes.add(started(host, values) == Status.OK)
+            assert len(outcomes) == 1, values
+            answers |= outcomes
     assert answers == {True, False}
 
 

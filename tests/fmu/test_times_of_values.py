@@ -137,8 +137,8 @@ def test_sample_that_is_refused_is_a_refused_step_and_changes_nothing(sampled: L
     with initialised(sampled) as host:
         put(host, 0.0)
         assert host.step(0.0, 0.5) == Status.Discard
-        [said] = host.messages
-        assert said.text == "step refused at t = 0 s: no rate"
+        [message] = host.messages
+        assert message.text == "step refused at t = 0 s: no rate"
         put(host, 2.0)
         assert seen(host) == (Status.OK, [3.0, 0.0])
 

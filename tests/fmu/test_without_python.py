@@ -39,8 +39,8 @@ each_scenario = pytest.mark.parametrize("scenario", SCENARIOS)
 def symbols(library: Path, option: str) -> set[str]:
     """Names of dynamic symbols, without their versions."""
     command = [str(NM), "-D", option, library]
-    said = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    return {line.split()[-1].partition("@")[0] for line in said.splitlines()}
+    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    return {line.split()[-1].partition("@")[0] for line in output.splitlines()}
 
 
 @pytest.fixture(scope="module")

@@ -214,15 +214,19 @@ class Component:
             parts += ["H_MAX = 0.03\n"]
         for hook, taken in arguments.items():
             made = RETURNS[hook]
-            names = {name: hint for one in sorted(taken) for name, hint in known[one].items()}
-            said = ", ".join(f"{one}: {TAKEN.get(one, FLOAT)}" for one in sorted(taken))
+            names = {
+                name: hint for argument in sorted(taken) for name, hint in known[argument].items()
+            }
+            signature = ", ".join(
+                f"{argument}: {TAKEN.get(argument, FLOAT)}" for argument in sorted(taken)
+            )
             result = self._made(made, groups[made], names)
             lines = [f"return {result}"]
             if draw.random() < 0.3:
                 test, value = self._number(BOOL, names, 2), self._number(FLOAT, names)
                 text = f"{{{value}:g}} is refused: {{{self._number(INT, names)}}} %"
                 lines.insert(0, f"if {test} and {value} > 3.0:\n        raise Refusal(f'{text}')")
-            parts += [function(f"{hook}({said}) -> {made}:", lines)]
+            parts += [function(f"{hook}({signature}) -> {made}:", lines)]
         if restarts:
             parts += self._restart(groups["State"], known["state"], known["inputs"])
         if draw.random() < 0.7:
@@ -233,7 +237,7 @@ class Component:
 
     def _some(self, *arguments: str) -> list[str]:
         """Some of the arguments that a hook may take."""
-        return [one for one in sorted(arguments) if self._random.random() < 0.7]
+        return [argument for argument in sorted(arguments) if self._random.random() < 0.7]
 
     def _class(self, name: str, fields: Names) -> str:
         lines = [f"    {self._field(name, field, hint)}" for field, hint in fields.items()]
@@ -242,14 +246,14 @@ class Component:
     def _field(self, name: str, field: str, hint: str) -> str:
         if name in ("State", "Derived"):
             return f"{field}: {hint}"
-        draw, said = self._random, [f'description="{self._random.choice(ABOUT)}"']
+        draw, parts = self._random, [f'description="{self._random.choice(ABOUT)}"']
         if name == "Parameters" and (field == "gain" or draw.random() < 0.5):
-            said += ["tunable=True"]
+            parts += ["tunable=True"]
         if name != "Outputs" and hint in (FLOAT, INT) and draw.random() < 0.5:
-            said += ["minimum=-1000", "maximum=1000"]
+            parts += ["minimum=-1000", "maximum=1000"]
         if hint == V3 and draw.random() < 0.5:
-            said += ['members=("x", "v", "double")']
-        note = f"Variable({', '.join(said)})"
+            parts += ['members=("x", "v", "double")']
+        note = f"Variable({', '.join(parts)})"
         inner = hint[len("Annotated[") : -1] if hint.startswith("Annotated") else hint
         kind = hint if hint in (PAIR, EMPTY) else f"Annotated[{inner}, {note}]"
         return f"{field}: {kind}" + ("" if name == "Outputs" else f" = {self._value(hint, {})}")
@@ -314,7 +318,7 @@ def text_of(seed: int) -> str:
     module, function = draw.choice(HELPERS)
     text = Component(seed).text().replace("HELPER", module).replace("white_noise", function)
     if seed % 2:
-        places = [(found.span(), "") for found in _TYPE.finditer(text, text.index("class Draws"))]
+        places = [(match.span(), "") for match in _TYPE.finditer(text, text.index("class Draws"))]
         if seed % 4 == 3:
             places = [
                 (m.span(), new) for old, new in MISTAKES for m in re.finditer(re.escape(old), text)
@@ -355,10 +359,10 @@ def findings(seed: int) -> list[str]:
 
 
 def _finding(script: Path, folder: Path, seed: int) -> str:
-    said = check.mistakes(script, folder / "checked")
-    if said:
-        is_told = seed % 2 and all(map(_PLACE.match, said))
-        return "" if is_told else f"refused: {said}"
+    mistakes = check.mistakes(script, folder / "checked")
+    if mistakes:
+        is_told = seed % 2 and all(map(_PLACE.match, mistakes))
+        return "" if is_told else f"refused: {mistakes}"
     for fmu in (folder / "checked").glob("*.fmu"):
         if flaws := validate_fmu(str(fmu)):
             return f"{fmu.name}: {flaws}"
@@ -368,9 +372,9 @@ def _finding(script: Path, folder: Path, seed: int) -> str:
 def difference(script: Path, folder: Path, plan: Sequence[int]) -> str:
     """The first difference of the two kinds, with a random step for each number of a plan."""
     traces = [_trace(Library(built(script, kind, folder / kind)), plan) for kind in KINDS]
-    for place, (one, other) in enumerate(zip(*traces, strict=True)):
-        if repr(one) != repr(other):
-            return f"at {place}: Python {one}, C {other}"
+    for place, (in_python, in_c) in enumerate(zip(*traces, strict=True)):
+        if repr(in_python) != repr(in_c):
+            return f"at {place}: Python {in_python}, C {in_c}"
     return ""
 
 

@@ -201,12 +201,12 @@ def attack(kind: Kind, content: bytes) -> int:
 
     """
     place = kind.place(content)
-    said, complaint = io.StringIO(), io.StringIO()
+    output, complaint = io.StringIO(), io.StringIO()
     with tempfile.TemporaryDirectory() as folder, chdir(folder):
         for name, data in place.files.items():
             Path(name).write_bytes(data)
         try:
-            with redirect_stdout(said), redirect_stderr(complaint), _bounded(folder) as outside:
+            with redirect_stdout(output), redirect_stderr(complaint), _bounded(folder) as outside:
                 status = auv_fmu(place.arguments)
         except Overdue as error:
             raise Finding(f"no end after {SECONDS} s, in {_where(error)}") from None
@@ -219,7 +219,7 @@ def attack(kind: Kind, content: bytes) -> int:
     text = "".join(line for line in lines if not line.startswith("auv-fmu: warning: "))
     if outside:
         raise Finding(f"wrote outside: {', '.join(outside)}")
-    if "MemoryError" in text or "MemoryError" in said.getvalue():
+    if "MemoryError" in text or "MemoryError" in output.getvalue():
         raise Finding(f"out of memory: {text:.200}")
     if status not in (0, 2):
         raise Finding(f"status {status}: {text:.200}")

@@ -166,7 +166,7 @@ def _wired(system: System, draw: Random) -> System:
     }
     draw.shuffle(ports["input"])
     for target, variable in ports["input"]:
-        fitting = [one for one in ports["output"] if can_feed(one[1], variable)]
+        fitting = [port for port in ports["output"] if can_feed(port[1], variable)]
         if not fitting or draw.random() < 0.2:
             continue
         for source, output in draw.sample(fitting, min(3, len(fitting))):
@@ -270,17 +270,17 @@ class Ways:
 
     def __init__(self, made: Sequence[Made], folder: Path) -> None:
         self._folder = folder
-        self._shared = Equations((one.definition for one in made), (), is_tuned=True)
+        self._shared = Equations((drawn.definition for drawn in made), (), is_tuned=True)
         self._object = compiled(self._shared.apart(), folder / "equations.o", "-DAPART=", "-c")
 
-    def programs(self, of: Drawn, number: int) -> Iterator[tuple[str, Text, Path]]:
+    def programs(self, drawn: Drawn, number: int) -> Iterator[tuple[str, Text, Path]]:
         """Programs of a system, each with the name of the way in which it was made."""
-        plan, place = of.plan(NATIVE), self._folder / f"{number}"
-        text = Text(plan, of.definitions, alters=True, shared=self._shared)
+        plan, place = drawn.plan(NATIVE), self._folder / f"{number}"
+        text = Text(plan, drawn.definitions, alters=True, shared=self._shared)
         options = "-DAPART=", self._object, "-shared"
         yield "alters", text, compiled(text.apart(), place.with_suffix(".a.so"), *options)
         is_quick = number % 2 == 1
-        text = Text(plan, of.definitions, is_tuned=of.is_tuned, is_quick=is_quick)
+        text = Text(plan, drawn.definitions, is_tuned=drawn.is_tuned, is_quick=is_quick)
         library = compiled(text.text(), place.with_suffix(".b.so"), "-shared")
         yield QUICK if text.is_quick else "careful", text, library
 
@@ -332,18 +332,18 @@ def _forget(folder: Path) -> None:
             del sys.modules[name]
 
 
-def _outcome(of: Drawn, ways: Ways, number: int) -> Outcome:
-    wanted, other = (run_of_fmus(of.plan(kind)) for kind in (PYTHON, NATIVE))
+def _outcome(drawn: Drawn, ways: Ways, number: int) -> Outcome:
+    wanted, other = (run_of_fmus(drawn.plan(kind)) for kind in (PYTHON, NATIVE))
     runs = {"FMUs": other}
-    for way, text, library in ways.programs(of, number):
+    for way, text, library in ways.programs(drawn, number):
         runs[way] = run_of_program(text, library)
     found = [
-        f"{way}: {said}"
+        f"{way}: {what}"
         for way, run in runs.items()
-        if (said := difference(wanted, run, way == QUICK))
+        if (what := difference(wanted, run, way == QUICK))
     ]
     end = NOT_BEGUN if not wanted.has_begun else REFUSED if wanted.failure else WHOLE
-    return Outcome(of.system.name, end, found)
+    return Outcome(drawn.system.name, end, found)
 
 
 def difference(wanted: Run, found: Run, is_quick: bool = False) -> str:
@@ -354,9 +354,9 @@ def difference(wanted: Run, found: Run, is_quick: bool = False) -> str:
     if wanted.has_begun != found.has_begun:
         return f"{found.failure or 'begins'} instead of {wanted.failure or 'beginning'}"
     for name, values in wanted.rows.items():
-        for k, (one, other) in enumerate(zip(values, found.rows[name], strict=False)):
-            if one.tobytes() != other.tobytes():
-                return f"{name} is {other!r} in row {k}, not {one!r}"
+        for k, (expected, value) in enumerate(zip(values, found.rows[name], strict=False)):
+            if expected.tobytes() != value.tobytes():
+                return f"{name} is {value!r} in row {k}, not {expected!r}"
     is_so = wanted.failure.startswith(found.failure) and bool(wanted.failure) == bool(found.failure)
     if not is_so:
         return f"{found.failure or 'no failure'} instead of {wanted.failure or 'none'}"
@@ -366,4 +366,4 @@ def difference(wanted: Run, found: Run, is_quick: bool = False) -> str:
 
 def findings(seed: int) -> list[str]:
     """List the differences in the systems of a pool."""
-    return [f"{one.system}: {line}" for one in outcomes(seed) for line in one.findings]
+    return [f"{outcome.system}: {line}" for outcome in outcomes(seed) for line in outcome.findings]

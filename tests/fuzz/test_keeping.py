@@ -243,10 +243,10 @@ def fill(folder: Path, outside: Path, what: Folder) -> None:
 
 def call(arguments: list[str]) -> tuple[int, str]:
     """Exit status of a command, and its errors."""
-    said = StringIO()
-    with redirect_stderr(said), redirect_stdout(StringIO()):
+    output = StringIO()
+    with redirect_stderr(output), redirect_stdout(StringIO()):
         status = main(arguments)
-    return status, said.getvalue()
+    return status, output.getvalue()
 
 
 def is_kept(name: str, content: bytes | str, after: dict[str, bytes | str]) -> bool:
@@ -300,13 +300,13 @@ def test_every_file_of_the_users_stays(here: Path, name: str):
             if what.force and name != "new":
                 arguments.append("--force")
             with quick(here):
-                status, said = call(arguments)
+                status, message = call(arguments)
             after = snapshot(out)
-            assert status in (0, 1, 2), said
-            assert not [k for k, v in before.items() if not is_kept(k, v, after)], said
+            assert status in (0, 1, 2), message
+            assert not [k for k, v in before.items() if not is_kept(k, v, after)], message
             assert snapshot(outside) | snapshot(here) == elsewhere
             if status == 2:
-                assert len(said.splitlines()) - said.count("warning: ") == 1, said
+                assert len(message.splitlines()) - message.count("warning: ") == 1, message
                 assert what.force or {k: after.get(k) for k in before} == before
 
     check()
@@ -398,14 +398,14 @@ def test_no_changed_bit_is_taken_in_silence(here: Path, tmp_path: Path, name: st
         copytree(left, whole)
         file = flipped(whole, place, bit)
         before = made(whole)
-        status, said = reading()
-        if status == 0 and "was changed since" not in said:
-            assert {**made(whole), file: b""} == {**right, file: b""}, said
+        status, message = reading()
+        if status == 0 and "was changed since" not in message:
+            assert {**made(whole), file: b""} == {**right, file: b""}, message
             assert file not in right or made(whole)[file] in (right[file], before[file])
         elif status != 0:
-            assert status == 2, said
-            assert all(line.startswith("auv-fmu: ") for line in said.splitlines()), said
-            assert str(whole) in said.splitlines()[-1]
+            assert status == 2, message
+            assert all(line.startswith("auv-fmu: ") for line in message.splitlines()), message
+            assert str(whole) in message.splitlines()[-1]
             assert made(whole) == before
 
     check()

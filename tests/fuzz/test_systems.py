@@ -12,5 +12,5 @@ from orchestrator.machine.compilers import machines_compiler
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 def test_programs_do_what_fmus_do_bit_for_bit():
     found = [*outcomes(1)]
-    assert [one for one in found if one.findings] == []
-    assert len([one for one in found if one.end == WHOLE]) > SYSTEMS / 4
+    assert [outcome for outcome in found if outcome.findings] == []
+    assert len([outcome for outcome in found if outcome.end == WHOLE]) > SYSTEMS / 4

@@ -149,7 +149,7 @@ def named_in(package: str) -> list[str]:
 def test_the_general_half_imports_neither_the_mathematics_nor_the_components():
     for path, name in modules("orchestrator"):
         if name and name[0] in GENERAL:
-            assert {one[0] for one in imports(path)}.isdisjoint(("auv_fmu", "fmus")), path
+            assert {module[0] for module in imports(path)}.isdisjoint(("auv_fmu", "fmus")), path
 
 
 #: Most names that may be imported from `orchestrator.cosim`; fewer are better.
@@ -162,21 +162,21 @@ def test_the_master_is_used_through_its_door_only():
     taken = set()
     for path in (path for folder in folders for path in folder.rglob("*.py")):
         if folder_of("orchestrator.cosim") not in path.parents:
-            inside = [one for one in imports(path) if one[:2] == ("orchestrator", "cosim")]
-            taken |= {one[2] for one in inside}
-            assert all(len(one) == 3 for one in inside), path
+            inside = [module for module in imports(path) if module[:2] == ("orchestrator", "cosim")]
+            taken |= {module[2] for module in inside}
+            assert all(len(module) == 3 for module in inside), path
     assert taken == set(import_module("orchestrator.cosim").__all__)
     assert len(taken) <= MOST_NAMES
 
 
 def test_components_are_built_with_the_lowest_room_of_the_orchestrator_only():
     for path, _ in modules("fmus"):
-        rooms = {one[1] for one in imports(path) if one[0] == "orchestrator"}
+        rooms = {module[1] for module in imports(path) if module[0] == "orchestrator"}
         assert rooms <= {"machine"}, path
 
 
 def is_translating(name: tuple[str, ...]) -> bool:
-    return any(name[: len(one)] == one for one in TRANSLATING)
+    return any(name[: len(prefix)] == prefix for prefix in TRANSLATING)
 
 
 def test_the_orchestrator_imports_only_declarations_of_components():
@@ -234,7 +234,7 @@ def test_no_modules_import_each_other():
         names = {".".join((package, *name)): path for path, name in modules(package)}
         needs = {}
         for name, path in names.items():
-            found = {".".join(part) for one in imports(path) for part in (one, one[:-1])}
+            found = {".".join(part) for module in imports(path) for part in (module, module[:-1])}
             needs[name] = found & (names.keys() - {name})
         list(TopologicalSorter(needs).static_order())
 

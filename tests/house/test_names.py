@@ -18,16 +18,18 @@ def test_a_unit_test_is_named_after_what_it_tests():
     for path in (ROOT / "tests" / "unit").rglob("test_*.py"):
         tested = path.relative_to(ROOT / "tests" / "unit").with_stem(path.stem[5:])
         found = [ROOT / tested, ROOT / "src" / tested]
-        ways = [way for it in found for way in (it, it.with_suffix(".c"), it.with_suffix(""))]
+        ways = [
+            way for path in found for way in (path, path.with_suffix(".c"), path.with_suffix(""))
+        ]
         assert any(way.exists() for way in ways), path
 
 
 def test_terms_are_told_once_and_in_order():
     names = [term for term, *_ in TERMS]
     users = re.findall(r"^\| (.+?) \| .+ \|$", USERS, re.MULTILINE)[1:]
-    for told in (names, users):
-        assert len(told) >= 25
-        assert told == sorted(set(told), key=str.casefold)
+    for listed in (names, users):
+        assert len(listed) >= 25
+        assert listed == sorted(set(listed), key=str.casefold)
 
 
 @pytest.mark.parametrize(("place", "name"), [term[1:] for term in TERMS], ids=str)

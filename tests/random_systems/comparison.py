@@ -118,8 +118,8 @@ def outcomes(seed: int) -> Iterator[Outcome]:
 
 def findings(seed: int) -> list[str]:
     """List the runs of a system that differ or are refused."""
-    wrong = (one for one in outcomes(seed) if one.what not in (EQUAL, UNDECIDED))
-    return [f"{one.how}: {one.what}: {one.why}" for one in wrong]
+    wrong = (outcome for outcome in outcomes(seed) if outcome.what not in (EQUAL, UNDECIDED))
+    return [f"{outcome.how}: {outcome.what}: {outcome.why}" for outcome in wrong]
 
 
 def difference(

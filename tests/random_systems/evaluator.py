@@ -99,9 +99,9 @@ class Machine:
     def __init__(self, part: Part, start_time: float) -> None:
         self.fmu, self.time = part.fmu, start_time
         self.values = {
-            one.name: typed(one, part.values.get(one.name, one.start))
-            for one in part.fmu.variables
-            if one.causality != "output"
+            variable.name: typed(variable, part.values.get(variable.name, variable.start))
+            for variable in part.fmu.variables
+            if variable.causality != "output"
         }
         self.states = [state.start for state in part.fmu.states]
         # Outputs that are computed only in steps, between these.
@@ -109,9 +109,9 @@ class Machine:
 
     def _scope(self, h: float = 0.0) -> dict[Any, Any]:
         scope: dict[Any, Any] = {"time": self.time, "length": h}
-        for one in self.fmu.variables:
-            if one.causality != "output":
-                scope[one.causality, one.name] = self.values[one.name]
+        for variable in self.fmu.variables:
+            if variable.causality != "output":
+                scope[variable.causality, variable.name] = self.values[variable.name]
         for i, state in enumerate(self.states):
             scope["state", i] = state
         return scope
@@ -136,7 +136,9 @@ class Machine:
         """Compute outputs for the time until the next step, if that is done in steps only."""
         self._held = {}
         if not self.fmu.responds:
-            self._held = {one.name: self.output(one.name) for one in self.fmu.having("output")}
+            self._held = {
+                variable.name: self.output(variable.name) for variable in self.fmu.having("output")
+            }
 
 
 def has_feedthrough(fmu: Fmu, output: str) -> bool:
@@ -149,10 +151,10 @@ def has_feedthrough(fmu: Fmu, output: str) -> bool:
 def follows(fmu: Fmu) -> bool:
     """True if any Real output follows any Real input at once."""
     return fmu.responds and any(
-        fmu.named(one).type == "Real"
+        fmu.named(needed).type == "Real"
         for output in fmu.having("output")
         if output.type == "Real"
-        for one in fmu.needs(output.name)
+        for needed in fmu.needs(output.name)
     )
 
 
@@ -178,7 +180,7 @@ def components(nodes: Sequence[Any], edges: Iterable[tuple[Any, Any]]) -> list[l
         group = next(
             group
             for group in groups
-            if not any(group[0] in reach[one[0]] for one in groups if one is not group)
+            if not any(group[0] in reach[other[0]] for other in groups if other is not group)
         )
         groups.remove(group)
         found.append(group)
@@ -309,10 +311,10 @@ class Evaluation:
         rings = {ring[0] for ring in self.rings}
         left, found = list(members), []
         while left:
-            ready = [one for one in left if not any(a in left and b == one for a, b in edges)]
-            taken = [one for one in ready if one not in rings] or ready
-            left = [one for one in left if one not in taken]
-            found += [members[one] for one in taken]
+            ready = [unit for unit in left if not any(a in left and b == unit for a, b in edges)]
+            taken = [unit for unit in ready if unit not in rings] or ready
+            left = [unit for unit in left if unit not in taken]
+            found += [members[unit] for unit in taken]
         return found
 
     # Values
@@ -479,14 +481,16 @@ class Evaluation:
     def _is_flat(self, name: str) -> bool:
         """True if no Real output follows a small change of any Real input."""
         machine, found = self.machines[name], []
-        outputs = [one.name for one in machine.fmu.having("output") if one.type == "Real"]
-        for one in machine.fmu.having("input"):
-            if one.type == "Real":
-                held = machine.values[one.name]
+        outputs = [
+            variable.name for variable in machine.fmu.having("output") if variable.type == "Real"
+        ]
+        for variable in machine.fmu.having("input"):
+            if variable.type == "Real":
+                held = machine.values[variable.name]
                 before = [machine.output(output) for output in outputs]
-                machine.values[one.name] = held + 1e-7 * max(abs(held), 1.0)
+                machine.values[variable.name] = held + 1e-7 * max(abs(held), 1.0)
                 found.append(before == [machine.output(output) for output in outputs])
-                machine.values[one.name] = held
+                machine.values[variable.name] = held
         return all(found)
 
     def _run_in_feedthrough_order(self, shown: dict[Port, Any]) -> None:
@@ -543,9 +547,9 @@ class Evaluation:
     def _computed(self, members: Sequence[str]) -> dict[Port, Any]:
         """The outputs of some components."""
         return {
-            (name, one.name): self.machines[name].output(one.name)
+            (name, variable.name): self.machines[name].output(variable.name)
             for name in members
-            for one in self.drawn.parts[name].fmu.having("output")
+            for variable in self.drawn.parts[name].fmu.having("output")
         }
 
     def _at_once(self, port: Port) -> bool:
@@ -578,8 +582,8 @@ class Evaluation:
     def _show(self, outputs: Mapping[Port, Any]) -> None:
         row = {".".join(port): value for port, value in outputs.items()}
         for name, machine in self.machines.items():
-            for one in machine.fmu.having("input"):
-                row[f"{name}.{one.name}"] = machine.values[one.name]
+            for variable in machine.fmu.having("input"):
+                row[f"{name}.{variable.name}"] = machine.values[variable.name]
         self.rows.append(row)
 
 

@@ -419,7 +419,7 @@ class _Draw:
             fmu.outputs[output.name] = how(fmu, output, in_ring)
 
     def _inputs(self, fmu: Fmu, *kinds: str) -> list[Variable]:
-        return [one for one in fmu.having("input") if not kinds or one.kind in kinds]
+        return [variable for variable in fmu.having("input") if not kinds or variable.kind in kinds]
 
     def _some(self, found: list[Variable]) -> list[Variable]:
         if not found:
@@ -428,7 +428,7 @@ class _Draw:
 
     def _gain(self, fmu: Fmu) -> Formula | None:
         """A parameter as a factor."""
-        found = [one for one in fmu.having("parameter") if one.kind == "Real"]
+        found = [variable for variable in fmu.having("parameter") if variable.kind == "Real"]
         return ("tanh", plain(self.random.choice(found))) if found and self.chance(0.3) else None
 
     def _weighted(self, fmu: Fmu, most: float) -> Formula:
@@ -640,7 +640,7 @@ def _postfix(fmu: Fmu, formula: Formula) -> list[str]:
         case "number" | "text":
             return [_word(operands[0])]
         case "input" | "parameter":
-            return [f"${[one.name for one in fmu.variables].index(operands[0])}"]
+            return [f"${[variable.name for variable in fmu.variables].index(operands[0])}"]
         case "state":
             return [f"@{operands[0]}"]
         case "time" | "length":
@@ -660,11 +660,11 @@ def model_text(fmu: Fmu) -> str:
         return " ".join((str(len(words)), *words))
 
     lines = [f"{fmu.responds:d} {len(fmu.variables)}"]
-    lines += [f"{one.kind[0]} {_word(one.start)}" for one in fmu.variables]
+    lines += [f"{variable.kind[0]} {_word(variable.start)}" for variable in fmu.variables]
     lines += [str(len(fmu.states))]
     lines += [f"{_word(state.start)} {counted(state.next)}" for state in fmu.states]
     lines += [str(len(fmu.outputs))]
-    places = {one.name: i for i, one in enumerate(fmu.variables)}
+    places = {variable.name: i for i, variable in enumerate(fmu.variables)}
     lines += [f"{places[name]} {counted(formula)}" for name, formula in fmu.outputs.items()]
     return "\n".join(lines) + "\n"
 
@@ -685,21 +685,25 @@ def literal(value: Any) -> str:
 def description(fmu: Fmu) -> str:
     """Its modelDescription.xml."""
     variables = []
-    for i, one in enumerate(fmu.variables):
-        inside = f' unit="{one.unit}"' if one.unit else ""
-        if one.kind == "Enumeration":
+    for i, variable in enumerate(fmu.variables):
+        inside = f' unit="{variable.unit}"' if variable.unit else ""
+        if variable.kind == "Enumeration":
             inside = ' declaredType="Level"'
-        start = None if one.start is None else literal(one.start)
-        variables.append(small_fmus.variable(one.name, i, one.causality, one.type, start, inside))
-    places = {one.name: str(i) for i, one in enumerate(fmu.variables, start=1)}
-    inputs = [one.name for one in fmu.having("input")]
+        start = None if variable.start is None else literal(variable.start)
+        variables.append(
+            small_fmus.variable(variable.name, i, variable.causality, variable.type, start, inside)
+        )
+    places = {variable.name: str(i) for i, variable in enumerate(fmu.variables, start=1)}
+    inputs = [variable.name for variable in fmu.having("input")]
 
     def unknown(name: str) -> str:
         found = inputs if fmu.declares == ALL else sorted(fmu.needs(name), key=inputs.index)
-        listed = " ".join(places[one] for one in found)
+        listed = " ".join(places[needed] for needed in found)
         return small_fmus.unknown(int(places[name]), None if fmu.declares == ABSENT else listed)
 
-    unknowns = [unknown(one.name) for one in fmu.having("output") if fmu.declares != UNLISTED]
+    unknowns = [
+        unknown(variable.name) for variable in fmu.having("output") if fmu.declares != UNLISTED
+    ]
     types = small_fmus.enumeration("Level", {name: i for i, name in enumerate(ITEMS, start=1)})
     return small_fmus.description(
         "slave",

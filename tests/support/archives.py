@@ -129,12 +129,12 @@ def system(
     return f'<ssd:System name="{name}">{"".join(parts)}{more}</ssd:System>'
 
 
-def connector(name: str, kind: str, unit: str = "", of: str = "Real") -> str:
+def connector(name: str, kind: str, unit: str = "", type_: str = "Real") -> str:
     """A connector."""
     stated = f' unit="{unit}"' if unit else ""
-    if of == "Enumeration":
+    if type_ == "Enumeration":
         stated = ' name="Speed"'
-    return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:{of}{stated}/></ssd:Connector>'
+    return f'<ssd:Connector name="{name}" kind="{kind}"><ssc:{type_}{stated}/></ssd:Connector>'
 
 
 def component(name: str, source: str = "a.fmu", bindings: str = "", **more: str) -> str:

@@ -129,8 +129,8 @@ class Draw:
 
     def settable(self, fmi_type: str) -> list[Variable]:
         """Ports that can be set before the initialisation."""
-        of = self.description.of
-        return [*of("input", fmi_type), *of("parameter", fmi_type)]
+        having = self.description.of
+        return [*having("input", fmi_type), *having("parameter", fmi_type)]
 
 
 #: The case of a step that ends too late.

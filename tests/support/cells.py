@@ -408,9 +408,9 @@ def _check_creation(library: Library, case: str, possible: bool) -> None:
         assert host.setup() == host.enter() == host.exit() == host.step(0.0, 0.02) == Status.OK
         host.free()
     else:
-        said = [message.text for message in host.messages]
-        assert len(said) == 1, f"{len(said)} messages: {said}"
-        assert "\n" not in said[0]
+        messages = [message.text for message in host.messages]
+        assert len(messages) == 1, f"{len(messages)} messages: {messages}"
+        assert "\n" not in messages[0]
     with instance(library) as after:
         assert after.setup() == Status.OK, "no instance can be made any more"
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from orchestrator.cosim import System
 
 
-def fleet_of(one: System, n: int, between: str = ".") -> System:
+def fleet_of(system: System, n: int, between: str = ".") -> System:
     """Several of a loop side by side: `auv1.plant` and so on, nothing between them.
 
     Args:
@@ -17,11 +17,11 @@ def fleet_of(one: System, n: int, between: str = ".") -> System:
 
     """
     all_of_them = [
-        one.renamed({name: f"auv{i}{between}{name}" for name in one.components})
+        system.renamed({name: f"auv{i}{between}{name}" for name in system.components})
         for i in range(1, n + 1)
     ]
     return replace(
-        one,
+        system,
         name="fleet",
         components={name: part for loop in all_of_them for name, part in loop.components.items()},
         connections=tuple(wire for loop in all_of_them for wire in loop.connections),

@@ -77,7 +77,7 @@ class Fmi3Library(Library):
         root = ElementTree.parse(folder / "modelDescription.xml")
         enumerations = root.iterfind("ModelVariables/Enumeration")
         self.functions: Any = _Functions(
-            self.own, {int(one.attrib["valueReference"]) for one in enumerations}
+            self.own, {int(element.attrib["valueReference"]) for element in enumerations}
         )
 
 
@@ -102,11 +102,11 @@ class _Functions:
         return self._library.fmi3InstantiateCoSimulation(*before, *no_events, None, logger, None)
 
     def _logger(self, callbacks: Any) -> Any:
-        told = callbacks._obj.logger if callbacks is not None else None
-        if not told:
+        log = callbacks._obj.logger if callbacks is not None else None
+        if not log:
             return Logger()
         logger = Logger(
-            lambda environment, status, category, text: told(
+            lambda environment, status, category, text: log(
                 environment, None, status, category, text
             )
         )
@@ -132,12 +132,14 @@ class _Functions:
         return entered
 
     def fmi2DoStep(self, component: c_void_p, time: c_double, h: c_double, no_set: int) -> int:
-        told = [c_bool(True) for _ in range(3)]
+        flags = [c_bool(True) for _ in range(3)]
         reached = c_double()
         status: int = self._library.fmi3DoStep(
-            component, time, h, c_bool(no_set), *map(byref, told), byref(reached)
+            component, time, h, c_bool(no_set), *map(byref, flags), byref(reached)
         )
-        assert status or not any(told), "events, an end or an early return, which there are none of"
+        assert status or not any(flags), (
+            "events, an end or an early return, which there are none of"
+        )
         return status
 
     # A boolean has one byte.
@@ -166,7 +168,9 @@ class _Functions:
         self, verb: str, component: c_void_p, references: Any, n: c_size_t, values: Any
     ) -> int:
         """Call the function for integers, and for enumerations their own."""
-        wide = [i for i, one in enumerate(references or ()) if one in self._enumerations]
+        wide = [
+            i for i, reference in enumerate(references or ()) if reference in self._enumerations
+        ]
         if values is None or not wide or len(references) != n.value:
             function = getattr(self._library, f"fmi3{verb}Int32")
             return int(function(component, references, n, values, n))

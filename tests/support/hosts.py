@@ -47,8 +47,8 @@ def unpacked(fmus: Path, folder: Path, names: Sequence[str] = NAMES) -> list[str
 
 def libraries_of(binary: Path) -> list[Path]:
     """The shared libraries that a binary is linked against, and the dynamic loader."""
-    said = subprocess.run(["ldd", binary], check=True, capture_output=True, text=True).stdout
-    return [Path(word) for word in said.split() if word.startswith("/")]
+    output = subprocess.run(["ldd", binary], check=True, capture_output=True, text=True).stdout
+    return [Path(word) for word in output.split() if word.startswith("/")]
 
 
 def bare_root(folder: Path, *binaries: Path) -> list[str]:
@@ -63,7 +63,7 @@ def bare_root(folder: Path, *binaries: Path) -> list[str]:
     command = [chroot] if os.geteuid() == 0 else [unshare, "-r", chroot]
     if subprocess.run([*command, "/", "true"], capture_output=True, check=False).returncode != 0:
         pytest.skip("the root folder may not be changed here")
-    needed = {found for binary in binaries for found in libraries_of(binary)}
+    needed = {library for binary in binaries for library in libraries_of(binary)}
     for path in needed | {binary for binary in binaries if folder not in binary.parents}:
         target = folder / path.relative_to("/")
         target.parent.mkdir(parents=True, exist_ok=True)

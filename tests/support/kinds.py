@@ -55,20 +55,20 @@ def outcome(
     return Outcome("", ending, columns, np.column_stack((table.time, table.group(*columns))))
 
 
-def difference(one: Outcome, other: Outcome) -> str:
+def difference(first: Outcome, second: Outcome) -> str:
     """The first difference between two outcomes, in words; empty: there is none, to the bit."""
-    if (one.refusal, one.ending) != (other.refusal, other.ending):
-        return f"{one.refusal or one.ending}, but {other.refusal or other.ending}"
-    if one.columns != other.columns:
-        return f"columns {one.columns}, but {other.columns}"
-    if one.rows.shape != other.rows.shape:
-        return f"{len(one.rows)} rows, but {len(other.rows)}"
+    if (first.refusal, first.ending) != (second.refusal, second.ending):
+        return f"{first.refusal or first.ending}, but {second.refusal or second.ending}"
+    if first.columns != second.columns:
+        return f"columns {first.columns}, but {second.columns}"
+    if first.rows.shape != second.rows.shape:
+        return f"{len(first.rows)} rows, but {len(second.rows)}"
     # As integers: -0.0 is not 0.0.
-    places = np.argwhere(one.rows.view(np.int64) != other.rows.view(np.int64))
+    places = np.argwhere(first.rows.view(np.int64) != second.rows.view(np.int64))
     if not len(places):
         return ""
     k, i = places[0]
     return (
-        f"{('time', *one.columns)[i]} at t = {one.rows[k, 0]:g} s: {one.rows[k, i]!r}, but "
-        f"{other.rows[k, i]!r}"
+        f"{('time', *first.columns)[i]} at t = {first.rows[k, 0]:g} s: {first.rows[k, i]!r}, but "
+        f"{second.rows[k, i]!r}"
     )

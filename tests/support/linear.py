@@ -138,7 +138,7 @@ def linear(
         return fmu
     causes = dict.fromkeys(INPUTS, "input") | dict.fromkeys(OUTPUTS, "output")
     causes |= dict.fromkeys(_PARAMETERS, "parameter")
-    said = {"dependencies": ("", "1 2"), "all": ("1 2", "1 2"), "nothing": (None, None)}
+    declared = {"dependencies": ("", "1 2"), "all": ("1 2", "1 2"), "nothing": (None, None)}
     able = (
         'canGetAndSetFMUstate="true" canInterpolateInputs="true" '
         'canSerializeFMUstate="true" providesDirectionalDerivative="true"'
@@ -146,12 +146,13 @@ def linear(
     variables = [variable(name, i, causes[name]) for i, name in enumerate(causes)]
     if tunable:
         variables = [
-            one.replace('variability="fixed"', 'variability="tunable"') for one in variables
+            variable.replace('variability="fixed"', 'variability="tunable"')
+            for variable in variables
         ]
     text = description(
         "linear",
         variables,
-        (unknown(3 + i, dependencies) for i, dependencies in enumerate(said.get(says, ()))),
+        (unknown(3 + i, dependencies) for i, dependencies in enumerate(declared.get(says, ()))),
         f'canHandleVariableCommunicationStepSize="true" {able if can else ""}',
     )
     return write(fmu, text, _SOURCE, *["-DCACHED"] * cached, *["-DFORGETS"] * forgets)

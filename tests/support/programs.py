@@ -79,7 +79,7 @@ def play(
     library.begin.argtypes = (
         ctypes.c_void_p, DOUBLES, *[ctypes.c_double] * 3, ctypes.c_int, ctypes.c_int,
     )  # fmt: skip
-    experiment, said = text.plan.experiment, (ctypes.c_int * 4)()
+    experiment, reason = text.plan.experiment, (ctypes.c_int * 4)()
     parameters = (ctypes.c_double * len(text.parameters))(*values_of(text))
     size = library.size_of_simulation()
     simulation, ahead = (ctypes.create_string_buffer(size) for _ in range(2))
@@ -100,9 +100,9 @@ def play(
             if text.alters
             else library.run(simulation, until, _pointer(rows))
         )  # fmt: skip
-    library.failure(simulation, said)
+    library.failure(simulation, reason)
     shown = rows[: library.rows_shown(simulation)]
-    return Played(shown, has_begun, outcome, (said[0], said[3]))
+    return Played(shown, has_begun, outcome, (reason[0], reason[3]))
 
 
 def _pointer(values: np.ndarray) -> Any:

@@ -244,8 +244,8 @@ class Host:
         self.callbacks = Callbacks(self._logger, *memory, None, None)
         self.component: int | None = None
         self._arrays = {
-            one: _Arrays(one, [v for v in self.description.variables if v.type == one])
-            for one in TYPES
+            type_: _Arrays(type_, [v for v in self.description.variables if v.type == type_])
+            for type_ in TYPES
         }
         self._outputs = _Arrays("Real", self.description.of("output", "Real"))
 

@@ -30,11 +30,11 @@ def relay(folder: Path, declares: bool = True, step: float | None = None) -> Pat
     causes |= dict.fromkeys(PARAMETERS, "parameter")
     variables = [variable(name, i, causes[name]) for i, name in enumerate(causes)]
     # Only g follows from an input, the first one, at once.
-    said = ("1", "", "", "") if declares else (None,) * 4
+    declared = ("1", "", "", "") if declares else (None,) * 4
     text = description(
         "relay",
         variables,
-        (unknown(3 + i, dependencies) for i, dependencies in enumerate(said)),
+        (unknown(3 + i, dependencies) for i, dependencies in enumerate(declared)),
         experiment="" if step is None else f'<DefaultExperiment stepSize="{step}"/>',
     )
     return write(fmu, text, _SOURCE)

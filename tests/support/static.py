@@ -37,9 +37,9 @@ class Static(SimpleNamespace):
         self.exchanged += 1
         self._values[2:4] = self._function(*self._values[:2])
 
-    def derivatives(self, outputs: Sequence[str], of: str) -> list[float]:
+    def derivatives(self, outputs: Sequence[str], variable: str) -> list[float]:
         slopes = np.asarray(self._slopes)
-        return [float(slopes[_PLACES[output] - 2, _PLACES[of]]) for output in outputs]
+        return [float(slopes[_PLACES[output] - 2, _PLACES[variable]]) for output in outputs]
 
     def read(self, ports: Sequence[str]) -> dict[str, Any]:
         return {port: float(self._values[_PLACES[port]]) for port in ports}

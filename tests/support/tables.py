@@ -67,13 +67,13 @@ def fleet(n: int) -> tuple[Loop, ...]:
 def fleet_table(n: int, rows: int = 400, without: Collection[str] = ()) -> Table:
     """Several of these loops, each with other phases, by the names that :func:`fleet` has."""
     of_each = {f"auv{i}": loop_table(rows, seed=i) for i in range(1, n + 1)}
-    columns = [f"{name}.{column}" for name, one in of_each.items() for column in one.columns]
-    values = np.column_stack([one.rows[:, 1:] for one in of_each.values()])
+    columns = [f"{name}.{column}" for name, table in of_each.items() for column in table.columns]
+    values = np.column_stack([table.rows[:, 1:] for table in of_each.values()])
     kept = [i for i, column in enumerate(columns) if column not in without]
     parameters = {
         PortName.read(f"{name}.{port}"): value
-        for name, one in of_each.items()
-        for port, value in one.parameters.items()
+        for name, table in of_each.items()
+        for port, value in table.parameters.items()
     }
     time = of_each["auv1"].time
     header = Header(tuple(columns[i] for i in kept), Experiment(float(time[-1]), STEP), parameters)

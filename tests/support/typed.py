@@ -85,9 +85,9 @@ def text() -> str:
     outputs = dict.fromkeys(_FREE, "") | {W: f"{V}", JOINED: f"{_FIRST + 24}"}
     outputs |= {_FIRST + 2 * i + 1: f"{_FIRST + 2 * i}" for i in range(len(SCALARS))}
     structure = "".join(
-        f'<{tag} valueReference="{reference}" dependencies="{of}"/>'
+        f'<{tag} valueReference="{reference}" dependencies="{dependencies}"/>'
         for tag in ("Output", "InitialUnknown")
-        for reference, of in outputs.items()
+        for reference, dependencies in outputs.items()
     )
     types = (
         '<TypeDefinitions><EnumerationType name="Mode"><Item name="calm" value="1"/>'

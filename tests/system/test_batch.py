@@ -52,7 +52,7 @@ def ready(name: str) -> Prepared:
 @cache
 def engines(*names: str, own: tuple[OwnIndex, ...] = ()) -> tuple[BatchEngine, FmuEngine]:
     made = {name: ready(name) for name in names}
-    batch = BatchEngine({name: one.system for name, one in made.items()}, own)
+    batch = BatchEngine({name: prepared.system for name, prepared in made.items()}, own)
     return batch, FmuEngine(made, "compiled", own)
 
 
@@ -84,11 +84,11 @@ def test_runs_of_studies_equal_the_fmus(name):
     """All indices are equal; the FMUs report why a run fails."""
     runs = sampled(name)
     batch, fmus = engines(*read_study(name).scenario)
-    for one, other in zip(batch.outcomes(runs), fmus.outcomes(runs), strict=True):
-        if one.failure == REFUSED:
-            assert other.failure and not one.indices
+    for by_batch, by_fmus in zip(batch.outcomes(runs), fmus.outcomes(runs), strict=True):
+        if by_batch.failure == REFUSED:
+            assert by_fmus.failure and not by_batch.indices
         else:
-            assert one == other
+            assert by_batch == by_fmus
 
 
 def compare_with_fmus(name: str, point: Point, own: tuple[OwnIndex, ...] = ()) -> None:
@@ -107,8 +107,8 @@ def compare_with_fmus(name: str, point: Point, own: tuple[OwnIndex, ...] = ()) -
     rows = np.column_stack([expected.time, expected.group(*table.columns)])
     different = np.argwhere(bits(table.rows) != bits(rows))
     assert not different.size, ("time", *table.columns)[different[0][1]]
-    [one], [other] = batch.outcomes([point]), fmus.outcomes([point])
-    assert one == other and one.indices
+    [by_batch], [by_fmus] = batch.outcomes([point]), fmus.outcomes([point])
+    assert by_batch == by_fmus and by_batch.indices
 
 
 #: With noise, and a shorter step at the end.
@@ -209,9 +209,9 @@ MISTAKES: list[tuple[str, dict[str, Any]]] = [
 def test_the_engine_refuses_the_same_as_the_fmus(mistake, order):
     name, values = mistake
     point = Point(5, name, values, 3.0, 0.02, order)
-    [[one], [other]] = (engine.outcomes([point]) for engine in engines(name))
-    assert other.failure
-    assert one == (5, {}, REFUSED, None)
+    [[by_batch], [by_fmus]] = (engine.outcomes([point]) for engine in engines(name))
+    assert by_fmus.failure
+    assert by_batch == (5, {}, REFUSED, None)
     with pytest.raises(InputError):
         engines(name)[0].table(point)
 
@@ -259,16 +259,16 @@ def test_values_that_would_make_a_loop_endless_are_refused(workplace):
 def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     study = {"scenario": "fig4", "stop_time": 3.0, "vary": {"planner.tau_d.q": [1.0, 40.0, 45.0]}}
-    one, other = (
+    by_batch, by_fmus = (
         sweep(study, engine=engine, kind=KIND, workers=1, out=tmp_path / engine)
         for engine in ("batch", "fmu")
     )
-    assert list(one) == list(other)
-    assert one["failure"][0] is None
-    assert all("SteepReference" in failure for failure in one["failure"][1:])
-    for name in one:
-        assert str(one[name].tolist()) == str(other[name].tolist()), name
-    assert (one.failed, one.cautions) == (2, other.cautions)
+    assert list(by_batch) == list(by_fmus)
+    assert by_batch["failure"][0] is None
+    assert all("SteepReference" in failure for failure in by_batch["failure"][1:])
+    for name in by_batch:
+        assert str(by_batch[name].tolist()) == str(by_fmus[name].tolist()), name
+    assert (by_batch.failed, by_batch.cautions) == (2, by_fmus.cautions)
 
 
 @pytest.mark.parametrize(

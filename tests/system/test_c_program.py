@@ -141,11 +141,11 @@ def test_single_precision_has_no_double_and_the_same_motion(programs: Path, name
     text = sources(programs / f"{name}-single")[0].read_text(encoding="utf-8")
     assert "double" not in re.sub(r'/\*.*?\*/|"[^"]*"', "", text, flags=re.DOTALL)
     result = expected(name, steps)
-    moved = [one for one in columns if re.search(r"\.(eta|y|y_d|e)\.", one)]
+    moved = [column for column in columns if re.search(r"\.(eta|y|y_d|e)\.", column)]
     assert len(moved) > 10
-    for one in moved:
-        found = rows[:, 1 + columns.index(one)]
-        np.testing.assert_allclose(found, result[one], rtol=0.0, atol=2e-4, err_msg=one)
+    for column in moved:
+        found = rows[:, 1 + columns.index(column)]
+        np.testing.assert_allclose(found, result[column], rtol=0.0, atol=2e-4, err_msg=column)
 
 
 @pytest.mark.parametrize("passage", _PASSAGES)
@@ -171,8 +171,8 @@ def test_single_precision_over_the_whole_of_fig4(programs: Path):
 def test_two_programs_are_linked_into_one(programs: Path, tmp_path: Path):
     (tmp_path / "both.c").write_text(BOTH, encoding="utf-8")
     folders = [programs / "fig4", programs / "path-single"]
-    compile_c(GCC, *STRICT, *EXACT, *(f"-I{one}" for one in folders), tmp_path / "both.c",
-              *(sources(one)[0] for one in folders), "-o", tmp_path / "both", "-lm")  # fmt: skip
+    compile_c(GCC, *STRICT, *EXACT, *(f"-I{path}" for path in folders), tmp_path / "both.c",
+              *(sources(path)[0] for path in folders), "-o", tmp_path / "both", "-lm")  # fmt: skip
     output = subprocess.run([tmp_path / "both"], check=True, capture_output=True, text=True).stdout
     times_and_places = [float(word) for word in output.split()]
     quiet = simulate("fig4", {"plant.noise.std": 0.0}, stop_time=2.0, kind="native")
@@ -195,9 +195,9 @@ def test_program_has_no_variables_and_calls_only_mathematics(
 ):
     found = symbols(sources(programs / name)[0], tmp_path)
     public = {f"{stem(name)}_{call}" for call in ("begin", "defaults", "failure", "step")}
-    assert {one for one, kind in found.items() if kind == "T"} == public
+    assert {symbol for symbol, kind in found.items() if kind == "T"} == public
     assert {*found.values()} <= {*"TtrU"}, "neither data nor bss"
-    assert all(ALLOWED.fullmatch(one) for one, kind in found.items() if kind == "U"), found
+    assert all(ALLOWED.fullmatch(symbol) for symbol, kind in found.items() if kind == "U"), found
 
 
 def deepest_call(graph: Path, root: str) -> int:
@@ -268,11 +268,13 @@ def test_microcontroller_gives_the_same_except_for_rounding(
     columns, rows = read_columns(table), np.vstack([*read_rows(table)])
     result = expected("fig4", 1000)
     assert len(rows) == steps + 1
-    compared = [one for one in columns if kind == "fig4" or re.search(r"\.(eta|y|e)\.", one)]
-    for one in compared:
-        found = rows[:, 1 + columns.index(one)]
+    compared = [
+        column for column in columns if kind == "fig4" or re.search(r"\.(eta|y|e)\.", column)
+    ]
+    for column in compared:
+        found = rows[:, 1 + columns.index(column)]
         np.testing.assert_allclose(
-            found, result[one][: steps + 1], rtol=0.0, atol=tolerance, err_msg=one
+            found, result[column][: steps + 1], rtol=0.0, atol=tolerance, err_msg=column
         )
 
 

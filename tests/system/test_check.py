@@ -192,8 +192,8 @@ def test_a_single_source_of_a_group_is_proposed(tmp_path):
     for folder in (taking, giving):
         folder.mkdir()
     a, b = (
-        read_component(name, build(folder, change=one))
-        for name, folder, one in zip("ab", (taking, giving), change, strict=True)
+        read_component(name, build(folder, change=edit))
+        for name, folder, edit in zip("ab", (taking, giving), change, strict=True)
     )
     system = System("open", {"a": a, "b": b}, ())
     ours = "nothing feeds or sets a.y.*, a.mode, a.on, a.said, b.u and 3 more"

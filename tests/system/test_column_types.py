@@ -92,8 +92,8 @@ def write_inputs(path: Path, rows: Sequence[dict[str, Value]]) -> None:
     types = {"Float64": "float64", "Float32": "float32", "Boolean": "bool_", "String": "string"}
     types |= {"Enumeration": "int8", **{kind: kind.lower() for kind in RANGES}}
     columns = {"time": arrow.array([k * H for k in range(len(rows))], arrow.float64())}
-    for kind, of in types.items():
-        columns[f"a.u_{kind}"] = arrow.array([row[kind] for row in rows], getattr(arrow, of)())
+    for kind, type_ in types.items():
+        columns[f"a.u_{kind}"] = arrow.array([row[kind] for row in rows], getattr(arrow, type_)())
     pytest.importorskip("pyarrow.parquet").write_table(arrow.table(columns), path)
 
 
@@ -170,7 +170,7 @@ def test_a_run_with_infinite_parameters_is_read_and_drawn(fmu: Path, tmp_path: P
             result.plot("a.y_String")
     for result in (made, stored):
         axes = result.plot("a.y_*nt64", "a.counter").axes
-        assert [one.get_ylabel() for one in axes] == ["a.y_Int64", "a.counter", "a.y_UInt64"]
+        assert [axis.get_ylabel() for axis in axes] == ["a.y_Int64", "a.counter", "a.y_UInt64"]
     arguments = ["plot", str(folder), "a.u_*n*", "--out", str(tmp_path / "plot.png")]
     assert main(arguments) == 0
     # Earlier versions wrote invalid JSON.

@@ -72,7 +72,7 @@ def test_parameters_of_the_user_win_over_the_comparison(workplace):
         + "parameters.plant.m11 = 27.0\nparameters.controller.K1 = [1.0, 2.0, 3.0]\n"
     )
     for given, mass in (({}, 27.0), ({"plant.m11": 28.0, "controller.k_d": 30.0}, 28.0)):
-        own, other = (one.system for one in pair_of(text, parameters=given))
+        own, other = (prepared.system for prepared in pair_of(text, parameters=given))
         assert own.value(PortName.read("plant.m11")) == given.get("plant.m11", 26.0)
         assert other.value(PortName.read("plant.m11")) == mass
         assert other.value(PortName.read("controller.eps_t")) == 2.0
@@ -114,8 +114,8 @@ def test_the_ready_scenarios_compare_the_other_controller(name):
     """Everything else is the same."""
     request = Request(kind="native")
     ours, theirs = (
-        one.system
-        for one in with_companion(prepare(*load_scenario(name, "native"), request), request)
+        prepared.system
+        for prepared in with_companion(prepare(*load_scenario(name, "native"), request), request)
     )
     assert ours.components.keys() == theirs.components.keys()
     for component, part in ours.components.items():

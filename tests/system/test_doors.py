@@ -81,8 +81,8 @@ for _ in range(int(sys.argv[2])):
 def osp(tmp_path: Path) -> Path:
     """The folder with the file."""
     folder, beside = tmp_path / "plant", tmp_path / "fmus"
-    for one in (folder, beside):
-        one.mkdir()
+    for place in (folder, beside):
+        place.mkdir()
     shutil.copy(relay(tmp_path), folder / "relay.fmu")
     shutil.copy(relay(tmp_path), beside / "relay one.fmu")
     (folder / OSP_STRUCTURE).write_text(OSP, encoding="utf-8")

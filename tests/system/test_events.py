@@ -140,8 +140,8 @@ def test_a_component_with_longer_steps_takes_an_event_at_its_next_one():
         simulate("fig4", stop_time=0.4, kind="native", steps={"controller": 0.04}, events=events)
         for events in ([], [{"at": 0.14, "for": 0.08, "bias": {"controller.eta.psi": 0.1}}])
     )
-    one, other = (table.step_values("controller.eta.psi") for table in (biased, plain))
-    difference = (one - other)[:, 0]
+    first, second = (table.step_values("controller.eta.psi") for table in (biased, plain))
+    difference = (first - second)[:, 0]
     # The vehicle answers a step later.
     np.testing.assert_array_equal(difference[:8], 0.0)
     np.testing.assert_allclose(difference[8:12], 0.1, atol=1e-3)
@@ -167,8 +167,10 @@ def test_a_run_is_replayed_from_its_table_bit_for_bit(tmp_path):
         for name in alone.columns:
             # The last command never acts.
             is_state = not name.startswith("plant.tau")
-            one, other = (t[name][1:] if is_state else t.step_values(name) for t in (alone, loop))
-            np.testing.assert_array_equal(one, other, name)
+            first, second = (
+                t[name][1:] if is_state else t.step_values(name) for t in (alone, loop)
+            )
+            np.testing.assert_array_equal(first, second, name)
 
 
 def test_water_that_moves_is_added_to_the_current(tmp_path):

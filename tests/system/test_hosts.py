@@ -237,12 +237,12 @@ def test_host_is_installed_when_it_is_first_run(dist: Path, monkeypatch):
     monkeypatch.setattr(hosts, "python_with", python)
     for pin in ("fmpy==1", "fmpy==2"):
         monkeypatch.setitem(HOSTS, pin, replace(HOSTS["fmpy"], pins=[pin]))
-    heard: list[str] = []
-    verdicts = list(compare(closed_loop(dist), ["fmpy==1", "fmpy==2"], 50, 0.02, hear=heard.append))
+    lines: list[str] = []
+    verdicts = list(compare(closed_loop(dist), ["fmpy==1", "fmpy==2"], 50, 0.02, hear=lines.append))
     assert [verdict.failure for verdict in verdicts] == ["no such version", None]
     assert [verdict.package for verdict in verdicts] == ["fmpy 1", "fmpy 2"]
     assert verdicts[1].deviation <= 1e-9
-    assert len(heard) == 2 and "fmpy 2" in heard[1]
+    assert len(lines) == 2 and "fmpy 2" in lines[1]
 
 
 @pytest.mark.parametrize(

@@ -90,16 +90,16 @@ def made(engine: Path, opened: str, folder: Path, alone: bool = False) -> Parts:
     """The parts of a page, with all scenarios or only the one that it opens."""
     data, programs = page_data(opened)
     if alone:
-        data["presets"] = [one for one in data["presets"] if one["name"] == data["opened"]]
+        data["presets"] = [preset for preset in data["presets"] if preset["name"] == data["opened"]]
     (folder / "data.json").write_text(json.dumps(data))
-    modules = [live_module(one.sources)[module.MODULE] for one in programs]
+    modules = [live_module(program.sources)[module.MODULE] for program in programs]
     return Parts(engine, modules, folder / "data.json")
 
 
 def rows_of(parts: Parts, name: str, folder: Path) -> dict[str, Any]:
     """Run a preset in Node: its rows go into files of a folder."""
     data = json.loads(parts.data.read_text())
-    data["presets"] = [one for one in data["presets"] if one["name"] == name]
+    data["presets"] = [preset for preset in data["presets"] if preset["name"] == name]
     (folder / "one.json").write_text(json.dumps(data))
     return dict(parts._replace(data=folder / "one.json").node("rows.mjs", str(folder)))
 
@@ -124,7 +124,7 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, part
         table, outcome = Table(), outcomes[f"{name}.{i}"]
         ending = run.run([table])
         assert outcome["columns"] == [table.columns[i - 1] for i in places(table)[1:]]
-        assert [tuple(one.values()) for one in outcome["happened"]] == [*ending.events]
+        assert [tuple(event.values()) for event in outcome["happened"]] == [*ending.events]
         assert tuple(outcome["messages"]) == ending.messages
         assert outcome.get("failure") == ending.failure
         wanted = table.rows[:, places(table)]
@@ -145,7 +145,7 @@ OF_SINES = ("final_error",)
 
 
 def compare_indices(
-    run: Prepared, table: Table, found: np.ndarray, outcome: Any, near: Sequence[str]
+    run: Prepared, table: Table, computed: np.ndarray, outcome: Any, near: Sequence[str]
 ):
     """Compare the indices of rows in Node with those that the master has of the same rows.
 
@@ -158,7 +158,7 @@ def compare_indices(
 
     """
     rows = table.rows.copy()
-    rows[:, places(table)] = found
+    rows[:, places(table)] = computed
     metrics = metrics_of(Table.of(table.header, rows), run.loops)
     together = {name: [value] for name, value in metrics.together.items()}
     assert len(together) == (len(run.loops) > 1)
@@ -228,7 +228,7 @@ def test_events_of_all_kinds_do_what_they_do_in_the_master(parts: Parts, tmp_pat
     outcome, run = both(ALL.replace("LAST", last), parts, tmp_path)
     ending, table = compare(run, outcome, tmp_path)
     assert table.time[-1] == pytest.approx(18.0)
-    assert [tuple(one.values()) for one in outcome["happened"]] == [*ending.events]
+    assert [tuple(event.values()) for event in outcome["happened"]] == [*ending.events]
     assert len(ending.events) > 12
     assert outcome["failure"] == "stopped at t = 18 s: plant refused its step"
     assert str(ending.failure).startswith("stopped at t = 18 s: plant: ")
@@ -237,9 +237,9 @@ def test_events_of_all_kinds_do_what_they_do_in_the_master(parts: Parts, tmp_pat
 def test_vehicles_have_any_names_and_may_have_no_controller(parts: Parts, tmp_path):
     outcome, run = both('stop_time = 5.0\n[components]\ntow = "AuvPlant"\n', parts, tmp_path)
     compare(run, outcome, tmp_path)
-    one, other = outcome["metrics"]
-    assert one.keys() - other.keys() == {"final_error"}
-    assert other["peak_command"] == [0.0, 0.0, 0.0]
+    first, second = outcome["metrics"]
+    assert first.keys() - second.keys() == {"final_error"}
+    assert second["peak_command"] == [0.0, 0.0, 0.0]
 
 
 def both(text: str, parts: Parts, folder: Path) -> tuple[Any, Prepared]:
@@ -306,14 +306,14 @@ def test_a_component_outside_the_language_is_refused_in_one_line(tmp_path, capsy
 def test_tables_are_the_same_in_node_and_in_a_browser(parts: Parts, opened: Browser):
     """Bit for bit."""
     wanted = parts.node("tables.mjs", given=json.dumps(CHANGES))
-    for changes, one in zip(CHANGES, wanted, strict=True):
+    for changes, expected in zip(CHANGES, wanted, strict=True):
         digest = opened.evaluate(f"""(async () => {{
             await auvfmu.set({json.dumps(changes)});
             const bytes = new TextEncoder().encode(await auvfmu.csv());
             const digest = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
             return Array.from(digest, (byte) => byte.toString(16).padStart(2, "0")).join("");
         }})()""")
-        assert digest == one["digest"], changes
+        assert digest == expected["digest"], changes
     assert opened.said == []
     # The page itself, and nothing else.
     assert [address.split(":")[0] for address in opened.requests] == ["file"]
@@ -397,7 +397,7 @@ def test_loops_are_told_apart_by_their_scenarios_and_drawn_in_one_order(tmp_path
     """If both have the same controller; and in the same order whichever a scenario has."""
     (tmp_path / "mine.toml").write_text('compare = { name = "fig4" }\n')
     loops = preset(str(tmp_path / "mine.toml"))[0]["loops"]
-    assert [one["label"] for one in loops] == ["mine", "fig4"]
+    assert [loop["label"] for loop in loops] == ["mine", "fig4"]
     assert (preset("fig5")[0]["drawn"], preset("fig5-pd")[0]["drawn"]) == ([0, 1], [1, 0])
 
 
@@ -408,8 +408,8 @@ def test_events_keep_their_numbers_where_a_loop_lacks_others(tmp_path):
         "[[events]]\nat = 2.0\nset = { plant.current.x = 0.1 }\n"
     )
     own, other = preset(str(tmp_path / "mine.toml"))[0]["loops"]
-    assert [one["number"] for one in own["events"]["mine"]] == [0, 1]
-    assert [one["number"] for one in other["events"]["mine"]] == [1]
+    assert [event["number"] for event in own["events"]["mine"]] == [0, 1]
+    assert [event["number"] for event in other["events"]["mine"]] == [1]
 
 
 @pytest.mark.parametrize(

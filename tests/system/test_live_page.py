@@ -114,7 +114,11 @@ class Live:
 
     def complaints(self) -> list[str]:
         """Errors of the page, and its requests to the network."""
-        fetched = [one for one in self._shown.requests if not one.startswith(("file:", "blob:"))]
+        fetched = [
+            request
+            for request in self._shown.requests
+            if not request.startswith(("file:", "blob:"))
+        ]
         return [*self._shown.said, *fetched]
 
 
@@ -408,7 +412,7 @@ def test_all_vehicles_are_shown_and_one_is_chosen(opened):
         opened.run(f"{CHOSEN}.value = '{vehicle}'; {CHOSEN}.dispatchEvent(new Event('change'))")
         sliders = opened.run(SLIDERS)
         assert f"{vehicle}.controller.eps_t" in sliders
-        assert not any(other in one for one in sliders)
+        assert not any(other in slider for slider in sliders)
         # Its indices, and the one of all vehicles.
         applied = found[:-1, header.index(f"{vehicle}.plant.tau_applied.u")]
         effort = np.sqrt(np.sum(applied**2 * np.diff(found[:, 0])))

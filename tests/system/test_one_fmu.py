@@ -68,7 +68,11 @@ def expected(name: str, **how: Any) -> Result:
 
 def outputs(path: Path) -> list[str]:
     found = fmpy.read_model_description(str(path)).modelVariables
-    return [one.name for one in found if one.causality == "output" and one.name != "fault"]
+    return [
+        variable.name
+        for variable in found
+        if variable.causality == "output" and variable.name != "fault"
+    ]
 
 
 def check(found: Any, result: Result, names: list[str]) -> None:
@@ -97,40 +101,40 @@ def slaves(path: Path, n: int) -> Iterator[list[Any]]:
     """New instances, initialised."""
     description, found = fmpy.read_model_description(str(path)), []
     for _ in range(n):
-        it = (FMU3Slave if description.fmiMajorVersion == 3 else FMU2Slave)(
+        slave = (FMU3Slave if description.fmiMajorVersion == 3 else FMU2Slave)(
             guid=description.guid,
             unzipDirectory=fmpy.extract(str(path)),
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName="one",
         )
-        it.instantiate()
+        slave.instantiate()
         if description.fmiMajorVersion == 2:
-            it.setupExperiment(startTime=0.0)
-        it.enterInitializationMode()
-        it.exitInitializationMode()
-        found.append(it)
+            slave.setupExperiment(startTime=0.0)
+        slave.enterInitializationMode()
+        slave.exitInitializationMode()
+        found.append(slave)
     yield found
-    for it in found:
-        it.terminate()
-    for it in found:
-        it.freeInstance()
+    for slave in found:
+        slave.terminate()
+    for slave in found:
+        slave.freeInstance()
 
 
 def real_outputs(path: Path) -> list[int]:
     found = fmpy.read_model_description(str(path)).modelVariables
     return [
-        one.valueReference
-        for one in found
-        if one.causality == "output" and one.type in ("Real", "Float64")
+        variable.valueReference
+        for variable in found
+        if variable.causality == "output" and variable.type in ("Real", "Float64")
     ]
 
 
-def rows(it: Any, references: list[int], steps: range) -> list[list[float]]:
+def rows(slave: Any, references: list[int], steps: range) -> list[list[float]]:
     """The outputs after each of some steps."""
-    get = it.getFloat64 if isinstance(it, FMU3Slave) else it.getReal
+    get = slave.getFloat64 if isinstance(slave, FMU3Slave) else slave.getReal
     found = []
     for k in steps:
-        it.doStep(currentCommunicationPoint=k * H, communicationStepSize=H)
+        slave.doStep(currentCommunicationPoint=k * H, communicationStepSize=H)
         found.append([*get(references)])
     return found
 
@@ -163,8 +167,8 @@ def test_orders_and_longer_steps_follow_the_scenario(workplace: Path, order: str
     check(play(path), expected("slow.toml"), outputs(path))
     description = fmpy.read_model_description(str(path))
     assert not description.coSimulation.canHandleVariableCommunicationStepSize
-    with slaves(path, 1) as [it], pytest.raises(FMICallException):
-        it.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.03)
+    with slaves(path, 1) as [slave], pytest.raises(FMICallException):
+        slave.doStep(currentCommunicationPoint=0.0, communicationStepSize=0.03)
 
 
 def test_a_longer_step_is_split(workplace: Path):
@@ -206,23 +210,25 @@ def test_tuned_parameters_act_as_they_do_in_a_run(workplace: Path):
 def test_a_state_determines_the_rest_of_the_run(workplace: Path, name: str, fmi: str):
     path = exported(name, "--fmi", fmi)
     references = real_outputs(path)
-    with slaves(path, 2) as [one, other]:
-        rows(one, references, range(41))
-        state = one.getFMUState()
-        content = one.serializeFMUState(state)
-        rest = rows(one, references, range(41, 80))
-        one.setFMUState(state)
-        assert rows(one, references, range(41, 80)) == rest
-        other.setFMUState(other.deserializeFMUState(content))
-        assert rows(other, references, range(41, 80)) == rest
+    with slaves(path, 2) as [first, second]:
+        rows(first, references, range(41))
+        state = first.getFMUState()
+        content = first.serializeFMUState(state)
+        rest = rows(first, references, range(41, 80))
+        first.setFMUState(state)
+        assert rows(first, references, range(41, 80)) == rest
+        second.setFMUState(second.deserializeFMUState(content))
+        assert rows(second, references, range(41, 80)) == rest
 
 
 def test_instances_do_not_know_of_each_other(workplace: Path):
     path = exported("fig4")
     references = real_outputs(path)
-    with slaves(path, 3) as [one, *others]:
-        alone = rows(one, references, range(30))
-        turns = [[rows(it, references, range(k, k + 1))[0] for it in others] for k in range(30)]
+    with slaves(path, 3) as [first, *others]:
+        alone = rows(first, references, range(30))
+        turns = [
+            [rows(slave, references, range(k, k + 1))[0] for slave in others] for k in range(30)
+        ]
     assert turns == [[row, row] for row in alone]
 
 
@@ -239,25 +245,28 @@ def test_a_controller_of_ones_own_goes_with_it(workplace: Path):
 def test_its_variables_match_the_components(workplace: Path):
     path = exported("fig4", "--set", "plant.noise.std=0")
     system = load("fig4").with_parameters({"plant.noise.std": 0.0})
-    found = {one.name: one for one in fmpy.read_model_description(str(path)).modelVariables}
+    found = {
+        variable.name: variable
+        for variable in fmpy.read_model_description(str(path)).modelVariables
+    }
     open_ones = {
         f"{name}.{port.name}"
         for name, component in system.components.items()
         for port in component.having("input")
         if port.name not in {wire.target.port for wire in system.feeding[name]}
     }
-    assert {name for name, one in found.items() if one.causality == "input"} == open_ones
+    assert {name for name, variable in found.items() if variable.causality == "input"} == open_ones
     for name, component in system.components.items():
         for own in component.variables.values():
             if own.causality not in ("output", "parameter") or own.name == "fault":
                 continue
-            one = found[f"{name}.{own.name}"]
+            variable = found[f"{name}.{own.name}"]
             kept = ("causality", "variability", "unit", "description", "type", "min", "max")
-            assert {what: getattr(one, what) for what in kept} == {
+            assert {what: getattr(variable, what) for what in kept} == {
                 what: getattr(own, what) for what in kept
             }
             if own.causality == "parameter":
-                start = Variable.of(one).typed(one.start, one.name)
+                start = Variable.of(variable).typed(variable.start, variable.name)
                 assert start == system.value(PortName(name, own.name))
     experiment = fmpy.read_model_description(str(path)).defaultExperiment
     assert (float(experiment.stopTime), float(experiment.stepSize)) == (100.0, H)
@@ -267,7 +276,9 @@ def test_its_variables_match_the_components(workplace: Path):
 def test_feedthrough_goes_along_the_connections(workplace: Path):
     """Water is felt in the velocity through it at once, in the position a step later."""
     outputs = fmpy.read_model_description(str(exported("fig4"))).outputs
-    found = {one.variable.name: {port.name for port in one.dependencies} for one in outputs}
+    found = {
+        output.variable.name: {port.name for port in output.dependencies} for output in outputs
+    }
     assert found["plant.eta.x"] == set()
     assert {name.rpartition(".")[0] for name in found["plant.nu_r.u"]} <= {
         "plant.water", "plant.dwater",
@@ -285,8 +296,8 @@ def test_terminals_match_the_components(workplace: Path):
     with zipfile.ZipFile(path) as archive:
         root = ElementTree.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
     found = {
-        one.get("name"): [member.get("variableName") for member in one]
-        for one in root.iter("Terminal")
+        terminal.get("name"): [member.get("variableName") for member in terminal]
+        for terminal in root.iter("Terminal")
     }
     axes = ("x", "y", "z", "phi", "theta", "psi")
     members = [name for name in found["plant.eta"] if name is not None]

@@ -163,10 +163,18 @@ def test_a_sweep_cannot_be_reached(other):
         made = list(next(blocks))
         this = psutil.Process()
         processes = [this, *this.children(recursive=True)]
-        open_to = [one for process in processes for one in process.net_connections("all")]
-        assert not [one for one in open_to if one.status == psutil.CONN_LISTEN]
-        assert not [one for one in open_to if one.family == socket.AF_UNIX and one.laddr]
+        open_to = [
+            connection for process in processes for connection in process.net_connections("all")
+        ]
+        assert not [connection for connection in open_to if connection.status == psutil.CONN_LISTEN]
+        assert not [
+            connection
+            for connection in open_to
+            if connection.family == socket.AF_UNIX and connection.laddr
+        ]
         assert not done_by(other, lambda: list(process_folder().iterdir()))
-        made += [one for block in blocks for one in block]
-    expected = [outcome(one).indices["square"] for one in runs]
-    assert [one.indices["square"] for one in sorted(made, key=lambda one: one.number)] == expected
+        made += [result for block in blocks for result in block]
+    expected = [outcome(run).indices["square"] for run in runs]
+    assert [
+        result.indices["square"] for result in sorted(made, key=lambda result: result.number)
+    ] == expected

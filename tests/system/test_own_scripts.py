@@ -185,7 +185,7 @@ def in_python(action: Callable[[], object]) -> str:
     with warnings.catch_warnings(record=True) as output:
         warnings.simplefilter("always")
         action()
-    return "\n".join(str(one.message) for one in output)
+    return "\n".join(str(warning.message) for warning in output)
 
 
 def test_an_fmu_older_than_its_script_is_never_run_in_silence(own: Path, capsys):

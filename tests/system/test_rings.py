@@ -200,7 +200,9 @@ def test_inputs_change_linearly_also_where_a_new_value_ends_their_change(folder,
     system = ring(folder, 0.5, 0.9)
     forgetful = ring(folder, 0.5, 0.9, forgets=True)
     experiment = Experiment(1.0, H, coupling="linear")
-    table, other = (run_table(one, experiment, isolation=isolation) for one in (system, forgetful))
+    table, other = (
+        run_table(version, experiment, isolation=isolation) for version in (system, forgetful)
+    )
     assert table.failure is None
     assert other.rows.tobytes() == table.rows.tobytes()
 

@@ -83,12 +83,12 @@ def same(table: Table, other: Table, start: float) -> bool:
     times = [0, *(table.header.place[name] for name in TIMES & {*table.columns})]
     rows = table.rows.copy()
     rows[:, times] -= start
-    strings = [name for name, of in table.header.types.items() if of == "String"]
+    strings = [name for name, type_ in table.header.types.items() if type_ == "String"]
     return (
         rows.tobytes() == other.rows.tobytes()
         and all(list(table[name]) == list(other[name]) for name in strings)
         and table.ending.failure == other.ending.failure
-        and [one._replace(time=one.time - start) for one in table.ending.events]
+        and [event._replace(time=event.time - start) for event in table.ending.events]
         == [*other.ending.events]
     )
 
@@ -224,15 +224,15 @@ def cells(path: Path, start: float) -> list[list[str]]:
 
 @each_system
 def test_files_of_a_run_differ_only_in_their_times(folders, name, start):
-    one, other = folders(name, start) / "run", folders(name, 0.0) / "run"
+    late, early = folders(name, start) / "run", folders(name, 0.0) / "run"
     for file in ["result.csv", *["certificates.csv"] * (name == "vehicle")]:
-        rows = cells(one / file, start)
-        assert rows == cells(other / file, 0.0)
+        rows = cells(late / file, start)
+        assert rows == cells(early / file, 0.0)
         assert float(rows[1][0]) == 0.0 and float(rows[2][0]) == INTERVAL
-    metrics, expected = (json.loads((path / "metrics.json").read_text()) for path in (one, other))
+    metrics, expected = (json.loads((path / "metrics.json").read_text()) for path in (late, early))
     assert metrics.pop("stop_time") - start == expected.pop("stop_time")
     assert metrics == expected
-    record, first = (json.loads((path / "run.json").read_text()) for path in (one, other))
+    record, first = (json.loads((path / "run.json").read_text()) for path in (late, early))
     assert [{**event, "time": event["time"] - start} for event in record["events"]] == first[
         "events"
     ]
@@ -245,8 +245,8 @@ def test_commands_take_the_system_and_the_result(folders, name, start, capsys, t
     """`check`, `verify`, `export`, `plot`, and `run` with checkpoints."""
     output, *_ = SIGNALS[name]
     outputs = []
-    for one in (start, 0.0):
-        folder = folders(name, one)
+    for time in (start, 0.0):
+        folder = folders(name, time)
         ssp, result = str(folder / "x.ssp"), str(folder / "plain")
         capsys.readouterr()
         assert main(["check", ssp]) == 0
@@ -261,9 +261,9 @@ def test_commands_take_the_system_and_the_result(folders, name, start, capsys, t
             options = ["--no-figures", "--checkpoint-every", "1", "--out", result]
             assert main(["run", ssp, *options]) == 0
             assert Path(table).read_text() == whole
-        assert main(["plot", result, output, "--out", str(tmp_path / f"{one:g}.svg")]) == 0
-        assert main(["export", ssp, "--out", str(tmp_path / f"{one:g}")]) == 0
-        assert load(tmp_path / f"{one:g}" / "x.ssp").start_time == one
+        assert main(["plot", result, output, "--out", str(tmp_path / f"{time:g}.svg")]) == 0
+        assert main(["export", ssp, "--out", str(tmp_path / f"{time:g}")]) == 0
+        assert load(tmp_path / f"{time:g}" / "x.ssp").start_time == time
     assert outputs[0] == outputs[1]
 
 
@@ -278,16 +278,16 @@ def test_a_table_that_begins_before_the_run_does_not_belong_to_it(folders, refus
 def test_a_study_has_the_same_numbers(folders, name, tmp_path):
     pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     tables = []
-    for one in (STARTS[name], 0.0):
+    for time in (STARTS[name], 0.0):
         *_, parameter = SIGNALS[name]
-        study = tmp_path / f"{one:g}.toml"
+        study = tmp_path / f"{time:g}.toml"
         study.write_text(
-            f'scenario = "{folders(name, one) / "x.ssp"}"\n'
-            f'stop_time = {{ base = {one}, per = {{ "{parameter}" = 0.125 }} }}\n'
+            f'scenario = "{folders(name, time) / "x.ssp"}"\n'
+            f'stop_time = {{ base = {time}, per = {{ "{parameter}" = 0.125 }} }}\n'
             f'[vary]\n"{parameter}" = [4.0, 8.0, 16.0]\n'
         )
         assert main(["check", str(study)]) == 0
-        out = tmp_path / f"{one:g}"
+        out = tmp_path / f"{time:g}"
         assert main(["sweep", str(study), "--workers", "1", "--out", str(out)]) == 0
         tables.append(StudyResult(out))
     first, second = tables
@@ -308,10 +308,10 @@ def test_figures_show_the_same_at_other_times(folders):
     start = STARTS["vehicle"]
     panels, expected = drawn(start), drawn(0.0)
     assert len(panels) == len(expected) > 10
-    for one, other in zip(panels, expected, strict=True):
-        moved = start if one.get_xlim()[0] == start else 0.0
-        assert np.subtract(one.get_xlim(), moved) == pytest.approx(other.get_xlim())
-        assert one.get_ylim() == pytest.approx(other.get_ylim())
+    for panel, twin in zip(panels, expected, strict=True):
+        moved = start if panel.get_xlim()[0] == start else 0.0
+        assert np.subtract(panel.get_xlim(), moved) == pytest.approx(twin.get_xlim())
+        assert panel.get_ylim() == pytest.approx(twin.get_ylim())
     assert sum(axes.get_xlim()[0] == start for axes in panels) > 5
 
 
@@ -326,12 +326,12 @@ def test_pages_show_the_same_at_other_times(folders, tmp_path):
         data, [columns] = stored(out.read_text(encoding="utf-8"))
         return data, columns
 
-    (one, columns), (other, before) = page(start), page(0.0)
+    (late, columns), (early, before) = page(start), page(0.0)
     assert (columns.pop("time") - start).tolist() == before.pop("time").tolist()
     assert {name: values.tolist() for name, values in columns.items()} == {
         name: values.tolist() for name, values in before.items()
     }
-    times = [[event["time"] for event in data["loops"][0]["happened"]] for data in (one, other)]
+    times = [[event["time"] for event in data["loops"][0]["happened"]] for data in (late, early)]
     assert times[0] == [time + start for time in times[1]]
 
 

@@ -97,8 +97,8 @@ def test_each_vehicle_is_drawn(results):
         assert names.issuperset(figures)
     # There is one figure of both together, and none of the others.
     assert "two.png" in names and "two-velocity.png" not in names
-    one, other = ((results / "two" / f"two-{name}.png").read_bytes() for name in ("plant", "tow"))
-    assert one != other
+    plant, tow = ((results / "two" / f"two-{name}.png").read_bytes() for name in ("plant", "tow"))
+    assert plant != tow
 
 
 @needs_npm

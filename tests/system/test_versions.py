@@ -55,14 +55,16 @@ def test_the_fmu_is_valid(fmu):
 @EVERY_WAY
 def test_every_type_passes_through_three_fmus_exactly(fmu, way):
     wires = {
-        f"{to}.u_{of}": f"{start}.y_{of}" for start, to in ("ab", "bc") for of in typed.SCALARS
+        f"{to}.u_{kind}": f"{start}.y_{kind}"
+        for start, to in ("ab", "bc")
+        for kind in typed.SCALARS
     }
-    values = {f"a.u_{of}": value for of, value in typed.VALUES.items()}
+    values = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
     table = run(system := typed.system_of(fmu, "abc", wires, values), **way)
     assert table.failure is None and len(table) == STEPS + 1
-    for of, value in typed.VALUES.items():
+    for kind, value in typed.VALUES.items():
         for name in "abc":
-            assert set(table[f"{name}.y_{of}"].tolist()) == {value}, of
+            assert set(table[f"{name}.y_{kind}"].tolist()) == {value}, kind
     assert table.columns == run(system).columns
     assert table.rows.tobytes() == run(system).rows.tobytes()
 
@@ -258,12 +260,12 @@ def test_events_set_one_element_and_keep_the_others(fmu, way):
     assert table["a.y_Int64"].tolist() == [(2**62 + 1) * is_large for is_large in large]
 
 
-@pytest.mark.parametrize("of", ["Float64", "Float32"])
-def test_a_ring_of_one_type_is_solved_by_its_derivatives_or_without(fmu, tmp_path, of):
+@pytest.mark.parametrize("kind", ["Float64", "Float32"])
+def test_a_ring_of_one_type_is_solved_by_its_derivatives_or_without(fmu, tmp_path, kind):
     plain = typed.build(tmp_path, change=('providesDirectionalDerivatives="true"', ""))
-    for one in (fmu, plain):
-        wires = {f"a.u_{of}": f"b.y_{of}", f"b.u_{of}": f"a.y_{of}"}
-        system = typed.system_of(one, "ab", wires)
+    for path in (fmu, plain):
+        wires = {f"a.u_{kind}": f"b.y_{kind}", f"b.u_{kind}": f"a.y_{kind}"}
+        system = typed.system_of(path, "ab", wires)
         wired = [
             replace(wire, transformation=Linear(-2.0, offset))
             for wire, offset in zip(system.connections, (3.0, 4.0), strict=True)
@@ -271,5 +273,5 @@ def test_a_ring_of_one_type_is_solved_by_its_derivatives_or_without(fmu, tmp_pat
         table = run(replace(system, connections=tuple(wired)))
         assert table.failure is None
         # a = 3 - 2 b, b = 4 - 2 a: values that go round would grow.
-        assert table[f"a.y_{of}"] == pytest.approx(5 / 3, rel=1e-6)
-        assert table[f"b.y_{of}"] == pytest.approx(2 / 3, rel=1e-6)
+        assert table[f"a.y_{kind}"] == pytest.approx(5 / 3, rel=1e-6)
+        assert table[f"b.y_{kind}"] == pytest.approx(2 / 3, rel=1e-6)

@@ -86,7 +86,7 @@ def test_events_have_the_numbers_of_the_record():
     ending = Ending(failure="refused", remark="over", events=tuple(events))
     page = page_of(Drawn("run", Table.of(table.header, table.rows, ending)))
     [loop] = stored(page)[0]["loops"]
-    assert [Occurrence(**one) for one in loop["happened"]] == events
+    assert [Occurrence(**event) for event in loop["happened"]] == events
     assert "refused. over." in page
 
 

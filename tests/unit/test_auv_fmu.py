@@ -147,10 +147,10 @@ def name_of(kind: type) -> str:
 
 #: Every named tuple of the package that has defaults.
 SETS = {
-    name_of(found): found
+    name_of(value): value
     for module in walk_packages(auv_fmu.__path__, "auv_fmu.")
-    for found in vars(import_module(module.name)).values()
-    if isinstance(found, type) and getattr(found, "_field_defaults", None)
+    for value in vars(import_module(module.name)).values()
+    if isinstance(value, type) and getattr(value, "_field_defaults", None)
 }
 
 

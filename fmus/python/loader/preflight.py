@@ -64,8 +64,8 @@ def _check(resources: str, guid: str) -> None:
 
 def _stamps(files: list[str]) -> list[tuple[int, int, int]]:
     """Return numbers of files that differ after a change."""
-    found = map(os.stat, files)
-    return [(it.st_ino, it.st_size, it.st_mtime_ns) for it in found]
+    stats = map(os.stat, files)
+    return [(stat.st_ino, stat.st_size, stat.st_mtime_ns) for stat in stats]
 
 
 def _examined(resources: str) -> _Sound:
@@ -113,7 +113,7 @@ def _imported(script: str, resources: str) -> ModuleType:
 def _has_slave(module: ModuleType) -> bool:
     """Return True if a class is where PythonFMU looks for it."""
     return any(
-        isinstance(found, type)
-        and (name == "" or any(base.__name__ == "Fmi2Slave" for base in found.__mro__[1:]))
-        for name, found in vars(module).items()
+        isinstance(value, type)
+        and (name == "" or any(base.__name__ == "Fmi2Slave" for base in value.__mro__[1:]))
+        for name, value in vars(module).items()
     )

@@ -54,7 +54,7 @@ def native(
     fmi: str = "2",
     sanitizers: str = "",
     compiler: str = "cc",
-    of: Definition | None = None,
+    component: Definition | None = None,
 ) -> Path:
     """The FMU in C for this machine, unpacked into a folder, and beside it as a file.
 
@@ -63,18 +63,18 @@ def native(
         fmi: version.
         sanitizers: as the compiler names them.
         compiler: that makes it.
-        of: another component.
+        component: another one.
 
     """
-    of = of or definition()
+    component = component or definition()
     platform = "linux64" if fmi == "2" else fmpy.platform_tuple
-    library = folder / f"binaries/{platform}/{of.name}.so"
+    library = folder / f"binaries/{platform}/{component.name}.so"
     library.parent.mkdir(parents=True)
     (folder / "sources").mkdir()
-    identity = f'#define MODEL_NAME "{of.name}"\n#define MODEL_GUID "{_GUID}"\n'
-    for name, text in {**sources(of, fmi), "identity.h": identity}.items():
+    identity = f'#define MODEL_NAME "{component.name}"\n#define MODEL_GUID "{_GUID}"\n'
+    for name, text in {**sources(component, fmi), "identity.h": identity}.items():
         (folder / "sources" / name).write_text(text, encoding="utf-8")
-    (folder / "modelDescription.xml").write_bytes(_DESCRIBE[fmi](of, _GUID))
+    (folder / "modelDescription.xml").write_bytes(_DESCRIBE[fmi](component, _GUID))
     watched = ["-O1", f"-fsanitize={sanitizers}", "-fno-sanitize-recover"]
     options = watched if sanitizers else ["-O2"]
     command = [compiler, *_FLAGS, *options, "-o", library, SOURCES[fmi], "-lm"]

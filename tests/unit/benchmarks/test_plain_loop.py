@@ -50,7 +50,7 @@ def test_it_ends_as_the_straight_line_does_to_the_last_bit(plain_loop, tmp_path,
     vehicle, planner = last.vehicles.plant, last.vehicles.planner
     y_hat, dy_hat_o, theta_hat, _ = last.controller_state
     ends = (*vehicle.position, *vehicle.quaternion, *vehicle.nu_r)
-    assert any(one.tau != one.command for one in instants) == (limits == NARROW)
+    assert any(instant.tau != instant.command for instant in instants) == (limits == NARROW)
     assert (*found.position, *found.quaternion, *found.nu) == ends
     assert (*found.y_hat, *found.dy_hat_o, *found.theta_hat) == (*y_hat, *dy_hat_o, *theta_hat)
     ends = (*planner.position, planner.theta, planner.psi, *planner.nu)

@@ -111,17 +111,17 @@ def test_mistakes_are_told_with_file_and_line(tmp_path, monkeypatch, mistake, bu
     change, why = MISTAKES[mistake]
     write(tmp_path, change)
     monkeypatch.chdir(tmp_path)
-    status, said = built("own_lag.py", "--out", tmp_path)
+    status, message = built("own_lag.py", "--out", tmp_path)
     assert status == FAILED
-    assert said.startswith(why)
-    assert "\n" not in said
+    assert message.startswith(why)
+    assert "\n" not in message
 
 
 def test_a_mistake_in_a_module_beside_is_told_with_its_line(tmp_path, built):
     path = write(tmp_path, ("from math import expm1", "from beside import expm1"))
     (tmp_path / "beside.py").write_text("from math import expm1\n\n1 / 0\n")
-    status, said = built(path, "--out", tmp_path)
-    assert (status, said) == (
+    status, message = built(path, "--out", tmp_path)
+    assert (status, message) == (
         FAILED,
         f"{tmp_path}/beside.py:3: ZeroDivisionError: division by zero",
     )
@@ -130,9 +130,9 @@ def test_a_mistake_in_a_module_beside_is_told_with_its_line(tmp_path, built):
 def test_what_is_outside_the_language_is_told_when_it_is_to_become_c(tmp_path, monkeypatch, built):
     write(tmp_path, ("State(state.x -", "State(state.x ** 0.5 -"))
     monkeypatch.chdir(tmp_path)
-    status, said = built("own_lag.py", "--kind", "native", "--out", tmp_path)
+    status, message = built("own_lag.py", "--kind", "native", "--out", tmp_path)
     why = "own_lag.py:55: ** with other than a whole constant is not in the language of equations"
-    assert (status, said[: len(why)]) == (FAILED, why)
+    assert (status, message[: len(why)]) == (FAILED, why)
     assert built("own_lag.py", "--out", tmp_path) == (0, "")
 
 

@@ -79,12 +79,12 @@ def test_link_is_the_simulation_of_its_events(parameters, h, n):
     clear = all(not near(m, h * round(m / h)) for m in moments if m > 0.0)
     assume(clear and not any(0.0 < abs(x) < 1e-9 for x in apart))
     for t, state in states:
-        sent = [one for one in found if one[0] < t]
-        arrived = [one for one in sent if one[2] and one[0] + one[1] <= t]
+        sent = [message for message in found if message[0] < t]
+        arrived = [message for message in sent if message[2] and message[0] + message[1] <= t]
         assert state.sent == len(sent)
         assert state.received == len(arrived)
         assert state.lost == sum(not ok for _, _, ok in sent)
-        newest = max((one[0] for one in arrived), default=0.0)
+        newest = max((message[0] for message in arrived), default=0.0)
         assert state.newest.sent == newest
         seen = h * int(newest / h + 1e-6)
         assert state.newest.y == pytest.approx(y(seen), rel=1e-12, abs=1e-9)

@@ -347,7 +347,7 @@ def test_follower_that_finds_its_leader_again(z_max, speed, duration, past):
     def position(t):
         return (0.5 * min(t, 42.0) - 0.5 * max(0.0, t - 42.0), 0.0, 0.0)
 
-    received = [one for one in every(1.0, 0.2, 200.0) if not 40.0 < one[1] < 70.0]
+    received = [message for message in every(1.0, 0.2, 200.0) if not 40.0 < message[1] < 70.0]
     estimator = Estimator(z_max=z_max)
     rows = [*follow(estimator, position, received, 0.02, 9000)]
     errors = [(t, state.y_hat[0] - position(t)[0]) for t, state, _ in rows]

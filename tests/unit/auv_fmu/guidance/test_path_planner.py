@@ -267,14 +267,14 @@ def test_path_is_refused_where_its_pitch_is_beyond_its_limit_and_nowhere_else(wa
     assert is_too_steep(waypoints) == (found > motion_planner.STEEPEST)
 
 
-@given(one=st.floats(60.0, 84.99), other=st.floats(60.0, 84.99), turn=st.floats(0.0, 180.0))
+@given(first=st.floats(60.0, 84.99), second=st.floats(60.0, 84.99), turn=st.floats(0.0, 180.0))
 def test_pitch_of_one_corner_is_refused_where_the_closest_pass_by_the_vertical_is_beyond(
-    one, other, turn
+    first, second, turn
 ):
     """Velocities in a rounding are on the straight line from one to the other."""
     legs = [
         np.array([cos(climb) * cos(psi), cos(climb) * sin(psi), sin(climb)])
-        for climb, psi in ((radians(one), 0.0), (radians(other), radians(turn)))
+        for climb, psi in ((radians(first), 0.0), (radians(second), radians(turn)))
     ]
     points = [np.zeros(3), 40 * legs[0], 40 * (legs[0] + legs[1])]
     shares = np.linspace(0.0, 1.0, 2001)[:, None]

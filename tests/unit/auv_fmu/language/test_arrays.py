@@ -23,12 +23,12 @@ def matrices(rows: int, columns: int) -> st.SearchStrategy[np.ndarray]:
 
 @given(vectors(4), vectors(4), numbers)
 def test_vectors_are_added_and_scaled_like_numpys(v: np.ndarray, w: np.ndarray, x: float):
-    one, other = Vector(v), Vector(w)
-    assert one + other == tuple(v + w)
-    assert one - other == tuple(v - w)
-    assert -one == tuple(-v)
-    assert x * one == one * x == tuple(x * v)
-    assert one / 3.0 == tuple(v / 3.0)
+    first, second = Vector(v), Vector(w)
+    assert first + second == tuple(v + w)
+    assert first - second == tuple(v - w)
+    assert -first == tuple(-v)
+    assert x * first == first * x == tuple(x * v)
+    assert first / 3.0 == tuple(v / 3.0)
 
 
 @given(vectors(4), vectors(4))

@@ -78,16 +78,16 @@ def test_sequences_of_two_seeds_are_one_as_rarely_as_is_said():
 )
 def test_sequences_of_neighbouring_seeds_have_nothing_in_common(pairs):
     """Correlations of 3000 pairs are normal with a deviation of 1/sqrt(3000); 5 of them allowed."""
-    one, other = (
+    first, second = (
         np.array([drawn(start(*pair[side]), uniform, 3) for pair in pairs]) for side in (0, 1)
     )
     for k in range(3):
-        correlation = np.corrcoef(one[:, k], other[:, k])[0, 1]
+        correlation = np.corrcoef(first[:, k], second[:, k])[0, 1]
         assert abs(correlation) < 5 / sqrt(3000)
         # Twice the other one, less its whole part: what a generator without mixing gives.
-        folded = np.corrcoef(2 * one[:, k] % 1, other[:, k])[0, 1]
+        folded = np.corrcoef(2 * first[:, k] % 1, second[:, k])[0, 1]
         assert abs(folded) < 5 / sqrt(3000)
-        assert abs(one[:, k].mean() - 0.5) < 5 / sqrt(12 * 3000)
+        assert abs(first[:, k].mean() - 0.5) < 5 / sqrt(12 * 3000)
 
 
 def test_uniform_numbers_fill_their_interval_evenly():

@@ -102,11 +102,11 @@ def test_loop_is_the_same_in_axes_whose_z_is_up(gains):
         motion_planner.Parameters(tau_d=(5.0, -1.0, -2.0), eta0=(0.0, 0.0, 2.0, 0.0, 0.0)),
     )
     turned = np.array([1.0, -1.0, -1.0])
-    for one, other in zip(closed_loop(300, down), closed_loop(300, up), strict=True):
+    for first, second in zip(closed_loop(300, down), closed_loop(300, up), strict=True):
         for group in ("y", "dy", "euler"):
-            expected = turned * getattr(one.scene.plant, group)
-            np.testing.assert_allclose(getattr(other.scene.plant, group), expected, atol=1e-9)
-        np.testing.assert_allclose(other.tau, turned * one.tau, atol=1e-9)
+            expected = turned * getattr(first.scene.plant, group)
+            np.testing.assert_allclose(getattr(second.scene.plant, group), expected, atol=1e-9)
+        np.testing.assert_allclose(second.tau, turned * first.tau, atol=1e-9)
         np.testing.assert_allclose(
-            other.scene.reference.y_d, turned * one.scene.reference.y_d, atol=1e-9
+            second.scene.reference.y_d, turned * first.scene.reference.y_d, atol=1e-9
         )

@@ -125,9 +125,9 @@ def test_no_record_of_three_hours_repeats():
 
 @given(seed=seeds)
 def test_another_seed_is_another_sea(seed):
-    one, other = (used(Waves(n=4, seed=s)) for s in (seed, -seed + 1))
-    assert np.array_equal(one, used(Waves(n=4, seed=seed)))
-    assert not np.any(one[:, 4] == other[:, 4])
+    first, second = (used(Waves(n=4, seed=s)) for s in (seed, -seed + 1))
+    assert np.array_equal(first, used(Waves(n=4, seed=seed)))
+    assert not np.any(first[:, 4] == second[:, 4])
 
 
 def test_phases_are_uniform():
@@ -176,11 +176,11 @@ def test_a_regular_wave_runs_in_its_direction_at_its_phase_velocity(
     x, y, z = place
     later, way = t + 0.3, 0.3 * omega / k
     ahead = (x + way * cos(direction), y + way * sin(direction), z)
-    one, other = moved(sea, depth, place, t), moved(sea, depth, ahead, later)
-    assert one.elevation == pytest.approx(other.elevation, abs=1e-8)
-    np.testing.assert_allclose(one.velocity, other.velocity, atol=1e-7)
-    level = one.velocity[0] * cos(direction) + one.velocity[1] * sin(direction)
-    assert level * one.elevation >= -1e-12
+    first, second = moved(sea, depth, place, t), moved(sea, depth, ahead, later)
+    assert first.elevation == pytest.approx(second.elevation, abs=1e-8)
+    np.testing.assert_allclose(first.velocity, second.velocity, atol=1e-7)
+    level = first.velocity[0] * cos(direction) + first.velocity[1] * sin(direction)
+    assert level * first.elevation >= -1e-12
 
 
 # Dispersion

@@ -113,10 +113,10 @@ def test_each_kind_of_statement_and_expression_is_translated_or_refused(tmp_path
     text = HOW.replace("?", PARTS[kind])
     tree = ast.parse(text)
     assert any(type(node).__name__ == kind for node in ast.walk(tree))
-    said = said_of_module(HEAD + text, tmp_path)
-    assert bool(said) == (kind not in TRANSLATED)
+    lines = said_of_module(HEAD + text, tmp_path)
+    assert bool(lines) == (kind not in TRANSLATED)
     first = HEAD.count("\n") + 1
-    for line in said:
+    for line in lines:
         found = re.match(r"own\.py:(\d+): ", line)
         assert found, line
         assert first <= int(found[1]) <= first + text.count("\n")
@@ -136,13 +136,13 @@ def test_each_operator_is_translated_or_refused(tmp_path, kind):
     else:
         node.op = kind()
     text = HOW.replace("?", f"x = {ast.unparse(node)}")
-    said = said_of_module(HEAD + text, tmp_path)
-    assert all(re.match(r"own\.py:\d+: ", line) and kind.__name__ not in line for line in said)
+    lines = said_of_module(HEAD + text, tmp_path)
+    assert all(re.match(r"own\.py:\d+: ", line) and kind.__name__ not in line for line in lines)
     known = (
         ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod, ast.Pow, ast.USub, ast.UAdd,
         ast.Not, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq,
     )  # fmt: skip
-    assert bool(said) == (kind not in known)
+    assert bool(lines) == (kind not in known)
 
 
 def test_every_kind_of_this_python_has_an_example():
@@ -179,10 +179,10 @@ def test_every_kind_of_this_python_has_an_example():
 )  # fmt: skip
 def test_other_python_is_refused_with_its_line_and_an_alternative(tmp_path, line, what):
     head = "from math import hypot\n\n\ndef f(x: float) -> float:\n"
-    [said] = said_of_module(head + line + "\n", tmp_path)
-    place, _, said = said.removeprefix("own.py:").partition(": ")
+    [message] = said_of_module(head + line + "\n", tmp_path)
+    place, _, message = message.removeprefix("own.py:").partition(": ")
     better = f"; {INSTEAD[what]}" if what in INSTEAD else ""
-    assert said == f"{what} is not in the language of equations{better}"
+    assert message == f"{what} is not in the language of equations{better}"
     assert int(place) in (5, 7, 8)
 
 
@@ -200,9 +200,9 @@ def test_all_mistakes_of_all_functions_are_told_at_once_and_what_follows_from_th
         "    b = a + missing\n"
         "    return _twice(x, 1) + b\n"
     )
-    said = [line.split(";")[0] for line in said_of_module(text, tmp_path)]
+    lines = [line.split(";")[0] for line in said_of_module(text, tmp_path)]
     outside = "is not in the language of equations"
-    assert said == [
+    assert lines == [
         "own.py:1: the argument x of _twice has no type",
         f"own.py:2: a list {outside}",
         f"own.py:7: a comparison other than of size {outside}",
@@ -224,19 +224,19 @@ def test_what_a_class_changes_of_a_tuple_is_refused(tmp_path):
         "    def __getitem__(self, k):\n        return 2.0\n\n\n"
         "def f(x: float) -> float:\n    return A(x)[0]\n"
     )
-    [said] = said_of_module(text, tmp_path)
-    assert said == "own.py:4: __getitem__ in the class A: leave it out"
+    [message] = said_of_module(text, tmp_path)
+    assert message == "own.py:4: __getitem__ in the class A: leave it out"
 
 
 def test_an_expression_too_deep_for_python_is_refused_with_a_line(tmp_path):
     text = "def f(x: float) -> float:\n    return " + "x + " * 995 + "x\n"
-    [said] = said_of_module(text, tmp_path)
-    assert re.match(r"own\.py:[12]: (too deep for Python|an expression of 200 levels)", said)
+    [message] = said_of_module(text, tmp_path)
+    assert re.match(r"own\.py:[12]: (too deep for Python|an expression of 200 levels)", message)
 
 
 def test_calls_too_deep_for_python_are_refused_with_a_line(tmp_path):
     links = [f"def f{i}(x: float) -> float:\n    return f{i + 1}(x) + 1.0\n" for i in range(300)]
     text = "\n\n".join([*reversed(links), "def f300(x: float) -> float:\n    return x\n"])
-    said = said_of_module(text.replace("f0(", "f("), tmp_path)
+    lines = said_of_module(text.replace("f0(", "f("), tmp_path)
     why = r"own\.py:[1-9]\d*: too deep for Python: .* join functions that call each other"
-    assert said and all(re.fullmatch(why, one) for one in said)
+    assert lines and all(re.fullmatch(why, line) for line in lines)

@@ -88,9 +88,9 @@ parts = st.sampled_from(
 )  # fmt: skip
 
 
-@given(one=st.lists(parts, max_size=6), other=st.lists(parts, max_size=6))
-def test_no_two_names_are_one_in_c(one, other):
-    names = {name for name in ("".join(one), "".join(other)) if name.isidentifier()}
+@given(first=st.lists(parts, max_size=6), second=st.lists(parts, max_size=6))
+def test_no_two_names_are_one_in_c(first, second):
+    names = {name for name in ("".join(first), "".join(second)) if name.isidentifier()}
     assert len({in_c(name) for name in names}) == len(names)
 
 
@@ -108,9 +108,13 @@ places = st.tuples(identifiers, identifiers)
 def test_names_outside_of_functions_are_unique(classes, functions, constants):
     """Classes, arrays and tuples of them, functions and constants, in modules of any name."""
     records = [type_of(NamedTuple(name, [("x", float)])) for name in classes]
-    types = [t for one in records for t in (one, Array(one, 3), Record((("m0", one), ("m1", INT))))]
+    types = [
+        t
+        for record in records
+        for t in (record, Array(record, 3), Record((("m0", record), ("m1", INT))))
+    ]
     found = [(*place, value, FLOAT if type(value) is float else INT) for place, value in constants]
-    body = [Do(Constant(*one)) for one in found]
+    body = [Do(Constant(*pair)) for pair in found]
     arguments = {f"x{i}": type_ for i, type_ in enumerate((*types, Array(FLOAT, 3)))}
     made = [Function(*place, arguments, body=body) for place in functions]
     text = Emitter(made).text()

@@ -80,9 +80,9 @@ class Runtime:
         self._library.show_in(c_char_p(directives), c_double(number), text)
         return text.value.decode()
 
-    def text(self, said: bytes) -> bytes:
+    def text(self, content: bytes) -> bytes:
         text = create_string_buffer(ROOM)
-        self._library.show_text(c_char_p(said), text)
+        self._library.show_text(c_char_p(content), text)
         return text.value
 
     def is_utf8(self, content: bytes) -> bool:

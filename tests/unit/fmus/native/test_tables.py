@@ -41,7 +41,7 @@ def test_parameters_have_places_in_the_structures_of_the_equations():
 
 
 def test_reals_lie_before_all_others_in_the_order_of_their_ports():
-    inputs = sorted(("k", "u", "go", "v[1]", "A[2,2]", "pair[2]"), key=lambda it: row_of(it)[3])
+    inputs = sorted(("k", "u", "go", "v[1]", "A[2,2]", "pair[2]"), key=lambda name: row_of(name)[3])
     assert {name: int(row_of(name)[3]) for name in inputs} == {
         "u": 0, "v[1]": 1, "A[2,2]": 7, "k": 8, "go": 9, "pair[2]": 11,
     }  # fmt: skip
@@ -55,16 +55,16 @@ def test_inputs_start_with_values_in_ranges():
 
 def test_a_start_of_minus_zero_stays_one():
     port = Port("u.x", "input", "continuous", "Real", "Place", "m", -0.0)
-    of = replace(build.definition(), ports=(port,))
-    assert '"u.x", REAL, INPUT, CONTINUOUS, 0, -0.0, ' in tables(of)
+    definition = replace(build.definition(), ports=(port,))
+    assert '"u.x", REAL, INPUT, CONTINUOUS, 0, -0.0, ' in tables(definition)
 
 
 def test_names_of_choices_are_texts_in_c():
     odd = {'a"b\\': 0, "??/": -(2**31)}
-    of = replace(build.definition(), ports=(chosen("odd", odd),))
-    of = replace(of, parameters=ParameterSet(One, of.ports[:1]))
-    of = replace(of, behaviour=of.behaviour._replace(parameters=One))
-    assert r'{{"a\"b\\", 0}, {"\?\?/", -2147483648}};' in tables(of)
+    definition = replace(build.definition(), ports=(chosen("odd", odd),))
+    definition = replace(definition, parameters=ParameterSet(One, definition.ports[:1]))
+    definition = replace(definition, behaviour=definition.behaviour._replace(parameters=One))
+    assert r'{{"a\"b\\", 0}, {"\?\?/", -2147483648}};' in tables(definition)
 
 
 def test_members_of_enumerations_are_choices_of_ports_and_states():

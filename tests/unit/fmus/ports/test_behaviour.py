@@ -65,17 +65,17 @@ def behaviour(folder: Path, monkeypatch: pytest.MonkeyPatch, text: str):
 
 
 def test_types_and_hooks_are_read_from_the_text(tmp_path, monkeypatch):
-    said = behaviour(tmp_path, monkeypatch, GOOD)
-    assert [name for name, hook in said.hooks.items() if hook] == ["start", "outputs", "update"]
-    assert (said.state.__name__, said.parameters.__name__) == ("State", "Gains")
-    assert (said.inputs, said.derived, said.noisy, said.draws) == (Nothing, None, "", 0)
+    made = behaviour(tmp_path, monkeypatch, GOOD)
+    assert [name for name, hook in made.hooks.items() if hook] == ["start", "outputs", "update"]
+    assert (made.state.__name__, made.parameters.__name__) == ("State", "Gains")
+    assert (made.inputs, made.derived, made.noisy, made.draws) == (Nothing, None, "", 0)
 
 
 def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
-    said = behaviour(tmp_path, monkeypatch, GOOD + SEED + MEASURED)
-    assert (said.noisy, said.draws) == ("y", 2)
-    assert said.arguments("update") == ("h", "state")
-    assert said.arguments("measured") == ("n", "y")
+    made = behaviour(tmp_path, monkeypatch, GOOD + SEED + MEASURED)
+    assert (made.noisy, made.draws) == ("y", 2)
+    assert made.arguments("update") == ("h", "state")
+    assert made.arguments("measured") == ("n", "y")
 
 
 @pytest.mark.parametrize(
@@ -85,10 +85,10 @@ def test_hooks_take_what_they_need_in_any_order(tmp_path, monkeypatch):
 def test_a_function_that_another_calls_may_have_any_name(tmp_path, monkeypatch, name, use):
     helper = f"def {name}(x: float) -> float:\n    return x\n\n\n"
     caller = f"def _caller() -> None:\n    {use.format(name)}\n\n\n"
-    said = behaviour(
+    made = behaviour(
         tmp_path, monkeypatch, GOOD.replace("def _moved", f"{helper}{caller}def _moved")
     )
-    assert [name for name, hook in said.hooks.items() if hook] == ["start", "outputs", "update"]
+    assert [name for name, hook in made.hooks.items() if hook] == ["start", "outputs", "update"]
 
 
 @pytest.mark.parametrize(
@@ -242,8 +242,8 @@ def of_hooks(patch: pytest.MonkeyPatch, hooks: dict[str, dict[str, str]]) -> Mod
 
 
 def test_hooks_of_the_right_types_are_taken(monkeypatch):
-    said = read_behaviour(of_hooks(monkeypatch, RIGHT))
-    classes = (said.parameters, said.inputs, said.state, said.derived, said.outputs)
+    made = read_behaviour(of_hooks(monkeypatch, RIGHT))
+    classes = (made.parameters, made.inputs, made.state, made.derived, made.outputs)
     words = ["Parameters", "Inputs", "State", "Derived", "Outputs"]
     assert [kind.__name__ for kind in classes] == words
 
@@ -259,8 +259,8 @@ def test_no_other_type_is_taken(monkeypatch, hook, argument):
         module = of_hooks(monkeypatch, {**RIGHT, hook: {**RIGHT[hook], argument: wrong}})
         with pytest.raises(Misdeclared) as caught:
             read_behaviour(module)
-        told = str(caught.value)
-        assert len(told.splitlines()) == 1
+        message = str(caught.value)
+        assert len(message.splitlines()) == 1
         # Results of start and outputs are compared with arguments of other hooks.
         assert caught.value.place[0] == hook or hook in ("start", "outputs")
         assert argument in (*caught.value.place, "return"), wrong

@@ -40,9 +40,9 @@ def test_a_component_that_splits_its_steps_has_a_parameter_for_it(defined):
 def test_a_component_states_its_experiment(defined):
     lag = defined(("class State", "STEP_SIZE = 10\nSTOP_TIME = 3600.0\n\n\nclass State"))
     assert (lag.behaviour.step, lag.behaviour.stop) == (10.0, 3600.0)
-    said = ElementTree.fromstring(fmi2_description(lag, "{1}")).find("DefaultExperiment")
-    assert said is not None
-    assert said.attrib == {"startTime": "0.0", "stopTime": "3600.0", "stepSize": "10.0"}
+    element = ElementTree.fromstring(fmi2_description(lag, "{1}")).find("DefaultExperiment")
+    assert element is not None
+    assert element.attrib == {"startTime": "0.0", "stopTime": "3600.0", "stepSize": "10.0"}
 
 
 TAKES = ("outputs(state: State)", "outputs(state: State, inputs: Inputs)")

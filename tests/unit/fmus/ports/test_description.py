@@ -122,9 +122,9 @@ def test_integers_and_truth_values_depend_as_reals_do():
         FAULT,
     )
     assert [*dependencies(ports)] == [(3, [1], [1, 5]), (4, [], [2, 5]), (6, [], [])]
-    said = ["start", "min", "max", "unit"]
+    names = ["start", "min", "max", "unit"]
     assert [
-        [value_attributes(port).get(name) for name in said] for port in ports[:2]
+        [value_attributes(port).get(name) for name in names] for port in ports[:2]
     ] == [["3", "-5", None, None], ["true", None, None, None]]  # fmt: skip
 
 
@@ -132,8 +132,8 @@ def test_integers_and_truth_values_depend_as_reals_do():
 @example([-0.0, 0.1 + 0.2, pi / 2])
 def test_numbers_are_read_back_bit_for_bit(numbers: list[float]):
     low, start, high = numbers
-    said = value_attributes(Port("k", "input", *REAL, "Gain", "1", start, low, high))
-    read = [float(said[name]).hex() for name in ("min", "start", "max")]
+    attributes = value_attributes(Port("k", "input", *REAL, "Gain", "1", start, low, high))
+    read = [float(attributes[name]).hex() for name in ("min", "start", "max")]
     assert read == [low.hex(), start.hex(), high.hex()]
 
 
@@ -245,14 +245,14 @@ def test_description_of_fmi_3_follows_from_the_ports():
     nothing: Any = None
     origin = Origin("Me", "MIT", "1.2", "From a book")
     experiment = DefaultExperiment(3600.0, 10.0)
-    it = Definition("It", "A thing", origin, PORTS_3, experiment, nothing, (), nothing)
-    found = fmi3_description(it, "{1}")
+    definition = Definition("It", "A thing", origin, PORTS_3, experiment, nothing, (), nothing)
+    found = fmi3_description(definition, "{1}")
     assert canonical(found) == canonical(DESCRIPTION_3)
 
 
 def test_build_description_names_the_one_file():
     assert canonical(fmi3_build_description("It")) == canonical(BUILD)
-    named = [one.get("platform") for one in ElementTree.fromstring(BUILD)]
+    named = [element.get("platform") for element in ElementTree.fromstring(BUILD)]
     assert named == [*TARGETS], "each machine that libraries are built for, once"
 
 
@@ -262,15 +262,17 @@ def test_arrays_have_the_dependencies_of_their_elements():
         *(Port(f"u.{k}", "input", *REAL, f"The u: {k}", "m", 0.5, array=arrays[0]) for k in "ab"),
         Port("k", "parameter", "fixed", "Real", "Gain", "1", 1.0),
         *(
-            Port(f"y.{k}", "output", *REAL, f"The y: {k}", "m", None, feedthrough=of, initially=at,
-                 array=arrays[1])
-            for k, of, at in (("a", ("u.a", "time"), ()), ("b", (), ("u.b",)))
+            Port(f"y.{k}", "output", *REAL, f"The y: {k}", "m", None, feedthrough=through,
+                 initially=at, array=arrays[1])
+            for k, through, at in (("a", ("u.a", "time"), ()), ("b", (), ("u.b",)))
         ),
     )  # fmt: skip
     found = variables_of((*ports, TIME), arrays=True)
-    assert [(it.reference, it.port.name, len(it.elements)) for it in found] == [
+    assert [(whole.reference, whole.port.name, len(whole.elements)) for whole in found] == [
         (1, "u", 2), (3, "k", 1), (4, "y", 2), (6, "time", 1),
     ]  # fmt: skip
     assert found[2].port.description == "The y"
     assert (found[2].port.feedthrough, found[2].port.initially) == (("u", "time"), ())
-    assert [it.port for it in variables_of(ports)] == [replace(one, array=None) for one in ports]
+    assert [variable.port for variable in variables_of(ports)] == [
+        replace(port, array=None) for port in ports
+    ]

@@ -33,8 +33,10 @@ PLAIN = Variable(description="Some")
 
 def made(**fields: Any) -> Any:
     """A class `Fields` with fields, each a type or a type and a default value."""
-    types = {name: it[0] if isinstance(it, tuple) else it for name, it in fields.items()}
-    defaults = {name: it[1] for name, it in fields.items() if isinstance(it, tuple)}
+    types = {
+        name: field[0] if isinstance(field, tuple) else field for name, field in fields.items()
+    }
+    defaults = {name: field[1] for name, field in fields.items() if isinstance(field, tuple)}
     cls: Any = NamedTuple("Fields", [*types.items()])
     cls.__new__.__defaults__ = tuple(defaults.values())
     cls._field_defaults = defaults
@@ -47,8 +49,8 @@ def ports(causality: str, **fields: Any) -> list[Port]:
 
 
 def test_a_float_is_a_real_with_unit_bounds_and_start():
-    said = Variable("s", "Time constant", minimum=POSITIVE, maximum=9.0, tunable=True)
-    assert ports("parameter", T=(Annotated[float, said], 2)) == [
+    note = Variable("s", "Time constant", minimum=POSITIVE, maximum=9.0, tunable=True)
+    assert ports("parameter", T=(Annotated[float, note], 2)) == [
         Port(
             "T", "parameter", "tunable", "Real", "Time constant", "s", 2.0,
             minimum=POSITIVE, maximum=9.0,
@@ -110,13 +112,13 @@ def test_elements_have_numbers_or_names(hint, names):
 
 
 def test_members_may_have_units_of_their_own():
-    said = Variable({"q": "N.m", "u": "N"}, "Command")
-    found = ports("input", tau=Annotated[tuple[float, float], said])
+    note = Variable({"q": "N.m", "u": "N"}, "Command")
+    found = ports("input", tau=Annotated[tuple[float, float], note])
     assert [(port.name, port.unit) for port in found] == [("tau.q", "N.m"), ("tau.u", "N")]
 
 
 @pytest.mark.parametrize(
-    ("said", "names"),
+    ("note", "names"),
     [
         (Variable("m", "Place", name="lambda"), ["lambda[1]", "lambda[2]"]),
         (Variable({"x": "m", "z": "m"}, "Place", name="eta"), ["eta.x", "eta.z"]),
@@ -124,8 +126,8 @@ def test_members_may_have_units_of_their_own():
         (Variable("m", "Place", members=(2, 3), name="stage[{}].t"), ["stage[2].t", "stage[3].t"]),
     ],
 )
-def test_a_name_may_differ_from_the_name_of_the_field(said, names):
-    assert [port.name for port in ports("input", p=Annotated[Vector, 2, said])] == names
+def test_a_name_may_differ_from_the_name_of_the_field(note, names):
+    assert [port.name for port in ports("input", p=Annotated[Vector, 2, note])] == names
 
 
 def test_the_name_of_a_class_in_a_class_may_be_another_or_none():
@@ -288,14 +290,14 @@ def fields(draw: st.DrawFn) -> tuple[Any, Any]:
     kind, start = draw(kinds)
     unit = "N" if kind[0] in (float, Vector, Matrix) else "1"
     bounds = (draw(mostly(None, numbers)) for _ in range(2))
-    said = Variable(
+    note = Variable(
         draw(mostly(unit, texts)),
         draw(mostly("Plain", texts)),
         *bounds,
         draw(mostly(False, st.just(True))),
         draw(mostly((), members)),
     )
-    return Annotated[(*kind, said)], draw(mostly(start, starts))
+    return Annotated[(*kind, note)], draw(mostly(start, starts))
 
 
 @pytest.fixture(scope="module")
@@ -319,7 +321,9 @@ def test_what_is_declared_can_be_described(folder, causality, fields):
         assert flaw.place[0] in ("Fields", "Odd", "Far")
         return
     nothing, experiment = cast(Any, None), DefaultExperiment(100.0, 0.02)
-    it = Definition("It", "A thing", Origin(), tuple(found), experiment, nothing, (), nothing)
+    definition = Definition(
+        "It", "A thing", Origin(), tuple(found), experiment, nothing, (), nothing
+    )
     for describe in (fmi2_description, fmi3_description):
-        (folder / "modelDescription.xml").write_bytes(describe(it, "{1}"))
+        (folder / "modelDescription.xml").write_bytes(describe(definition, "{1}"))
         assert validate_fmu(str(folder)) == []

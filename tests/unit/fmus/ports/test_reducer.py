@@ -70,7 +70,7 @@ def test_the_end_of_the_run_that_it_describes_is_declared(tmp_path, monkeypatch)
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "told"),
+    ("before", "after", "words"),
     [
         ("def start", "def begin", "own_index has no function start"),
         ("def update", "def updated", "own_index.updated is called by no function here; is it upd"),
@@ -86,11 +86,11 @@ def test_the_end_of_the_run_that_it_describes_is_declared(tmp_path, monkeypatch)
         ('Annotated[float, Variable("m", "Depth", name="plant.eta.z")]', "float", "z has no unit"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_told(tmp_path, monkeypatch, before, after, told):
+def test_a_mistake_is_told(tmp_path, monkeypatch, before, after, words):
     assert GOOD.count(before) >= 1
     with pytest.raises(Misdeclared) as raised:
         reducer(tmp_path, monkeypatch, GOOD.replace(before, after, 1))
-    assert told in str(raised.value)
+    assert words in str(raised.value)
 
 
 @pytest.mark.parametrize("last", ["-1.0", "'5'", "True"])

@@ -134,7 +134,7 @@ def bound(text: str) -> dict[str, str]:
 
     names = {"__builtins__": {"__import__": load}}
     exec(text, names)
-    return {name: it.path for name, it in names.items() if isinstance(it, Imported)}
+    return {name: target.path for name, target in names.items() if isinstance(target, Imported)}
 
 
 NAMES = st.sampled_from(["a", "b", "a.c", "b.d", "os", "os.path"])

@@ -43,7 +43,7 @@ def test_what_equations_raise_is_named_and_logged_once_whatever_the_time(slave, 
     entry, *answers = slave.log_queue
     assert entry.msg == "step refused at t = 1 s: ZeroDivisionError: of nothing"
     assert entry.status == Fmi2Status.discard
-    assert [(it.msg, it.status, it.category) for it in answers] == [
+    assert [(answer.msg, answer.status, answer.category) for answer in answers] == [
         ("", Fmi2Status.discard, component.ANSWER)
     ] * 2
 

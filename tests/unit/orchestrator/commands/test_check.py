@@ -61,7 +61,7 @@ def test_a_valid_fmu_has_no_problems(fmu):
 
 
 @pytest.mark.parametrize(
-    ("kind", "change", "said"),
+    ("kind", "change", "words"),
     [
         ("note", ('start="1"', 'start="3"'), "start value odd.p 3"),
         ("note", ('dependencies="1"', 'dependencies="1 7"'), "variable '7'"),
@@ -81,9 +81,9 @@ def test_a_valid_fmu_has_no_problems(fmu):
         ("problem", ("<CoSimulation", "<ModelExchange"), "co-simulation"),
     ],
 )
-def test_mistakes_and_surprises_are_reported(fmu, kind, change, said):
+def test_mistakes_and_surprises_are_reported(fmu, kind, change, words):
     lines = [line for line in lines_about(fmu(change)) if line.startswith(f"{kind}: ")]
-    assert any(mentions(line, said) for line in lines), lines
+    assert any(mentions(line, words) for line in lines), lines
 
 
 def test_all_mistakes_are_reported_at_once(fmu):

@@ -10,9 +10,9 @@ import pytest
 from orchestrator.commands.main import COMMANDS, parser
 
 
-def commands_of(one):
+def commands_of(parser):
     """The parsers of a parser's commands, by name."""
-    [found] = [a for a in one._actions if isinstance(a, argparse._SubParsersAction)]
+    [found] = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
     return found.choices
 
 

@@ -121,19 +121,19 @@ def test_the_first_number_that_is_another_is_told_once(path: Path):
     changed = ROWS[100:].copy()
     changed[2000, 1] += 1e-12
     changed[2001:] = 0.0
-    told = [row_log.append(block) for block in np.array_split(changed, 12)]
+    answers = [row_log.append(block) for block in np.array_split(changed, 12)]
     row_log.close()
     size = len(np.array_split(changed, 12)[0])
-    assert [one for one in told if one] == [(2000 % size, 1)]
+    assert [answer for answer in answers if answer] == [(2000 % size, 1)]
     assert read(path).tobytes() == np.vstack((ROWS[:100], changed)).tobytes()
 
 
 def test_zero_is_not_minus_zero(path: Path):
     for value in (0.0, -0.0):
         row_log = RowLog(path, ID, 3, 5, digest(5))
-        told = row_log.append(np.full((1, 3), value))
+        answer = row_log.append(np.full((1, 3), value))
         row_log.close()
-    assert told == (0, 0)
+    assert answer == (0, 0)
 
 
 def test_fewer_rows_than_count_are_refused(path: Path):

@@ -131,11 +131,11 @@ def test_line_and_table_do_not_follow_each_other():
 
 
 def test_what_tables_come_to_is_bounded():
-    one, other = (
+    left, right = (
         Mapped(tuple((float(i), 0.5) for i in range(first, first + 501))) for first in (0, 501)
     )
     with pytest.raises(InputError, match="1,000"):
-        combine(one, other)
+        combine(left, right)
 
 
 @pytest.mark.parametrize("size", [1e200, 1e-200])

@@ -141,7 +141,7 @@ def test_it_acts_from_the_first_instant_that_its_time_is_not_after():
     # 1.3 s is within the third step of 0.5 s, and 1 s later two steps have passed.
     expected[3:5] = -1.0
     np.testing.assert_array_equal(values[:, 0], expected)
-    assert [(one.time, one.label) for one in trial.run.happened] == [(1.5, "it"), (2.5, "")]
+    assert [(event.time, event.label) for event in trial.run.happened] == [(1.5, "it"), (2.5, "")]
 
 
 @pytest.mark.parametrize("k", range(STEPS))
@@ -155,7 +155,7 @@ def test_a_condition_must_become_true():
     when = Condition(OUT, ">", 5.0)
     once, trial = seen([event(bias(0.5), when=when, lasts=0.5)], sources)
     assert list(np.flatnonzero(once[:, 0] == 9.5)) == [3]
-    assert [one.time for one in trial.run.happened] == [1.5, 2.0]
+    assert [event.time for event in trial.run.happened] == [1.5, 2.0]
     again, _ = seen([event(bias(0.5), when=when, lasts=0.5, repeat=True)], sources)
     assert list(np.flatnonzero(again[:, 0] == 9.5)) == [3, 5]
 

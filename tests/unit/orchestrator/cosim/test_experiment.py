@@ -104,7 +104,7 @@ def test_a_step_of_a_component_may_be_beyond_all_multiples():
 
 
 @pytest.mark.parametrize(
-    ("stop_time", "step", "start_time", "said"),
+    ("stop_time", "step", "start_time", "message"),
     [
         (1.0, 0.1, 5.0, "stop time 1 s must be after the start time, 5 s, and finite"),
         (0.0, 0.1, 0.0, "stop time 0 s must be positive, and finite"),
@@ -114,7 +114,7 @@ def test_a_step_of_a_component_may_be_beyond_all_multiples():
         (1.0, float("nan"), 5.0, "step nan s must be positive, and finite"),
     ],
 )
-def test_the_number_that_is_wrong_is_named(stop_time, step, start_time, said):
+def test_the_number_that_is_wrong_is_named(stop_time, step, start_time, message):
     with pytest.raises(InputError) as error:
         Experiment(stop_time, step, start_time=start_time)
-    assert str(error.value) == said
+    assert str(error.value) == message

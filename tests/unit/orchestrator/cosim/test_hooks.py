@@ -18,7 +18,7 @@ class World:
     """A clock that moves when a process sleeps, or computes."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.now, self.told = 1000.0, 0
+        self.now, self.handed_over = 1000.0, 0
         monkeypatch.setattr(timing, "monotonic", lambda: self.now)
         monkeypatch.setattr(timing, "sleep", self._sleep)
 
@@ -26,7 +26,7 @@ class World:
         self.now += seconds
 
     def hand_over(self) -> None:
-        self.told += 1
+        self.handed_over += 1
         self.blocks.due = self.now + 0.2
 
     def run(self, experiment: Experiment, made: int = 0) -> SimpleNamespace:
@@ -55,7 +55,7 @@ def test_steps_end_when_the_clock_says_so(monkeypatch, factor):
     np.testing.assert_allclose(let_go, np.arange(5) * 0.25 / factor, atol=1e-9)
     assert clock.lateness.worst < 1e-9
     # Rows are handed over during a wait.
-    assert world.told >= int(1.0 / factor / 0.25) - 1
+    assert world.handed_over >= int(1.0 / factor / 0.25) - 1
 
 
 def test_a_step_that_is_late_is_made_up_for(monkeypatch):
@@ -98,8 +98,8 @@ def test_who_stops_a_run_does_not_wait(monkeypatch):
 @given(st.lists(st.floats(0.0, 100.0), min_size=1, max_size=300))
 def test_lateness_equals_the_statistics_of_a_list(seconds):
     late = Lateness()
-    for one in seconds:
-        late.take(one)
+    for second in seconds:
+        late.take(second)
     assert late.worst == max(seconds)
     assert late.mean == pytest.approx(np.mean(seconds))
     exact = float(np.percentile(seconds, 99, method="inverted_cdf"))

@@ -97,8 +97,8 @@ def test_the_first_value_that_cannot_be_is_named(system: System, values, words):
     for name, value in values.items():
         row.values[row.columns[PortName.read(name)]] = value
     with np.errstate(all="ignore"):
-        said = row.wrong("ab")
-    assert said is None if words is None else mentions(said, words)
+        complaint = row.wrong("ab")
+    assert complaint is None if words is None else mentions(complaint, words)
 
 
 def test_ports_that_move_are_those_that_change_by_more_than_rounding(system: System):

@@ -32,19 +32,19 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> System:
 class Watching:
     """An observer that records its calls, and may fail at the beginning."""
 
-    def __init__(self, told: list[object], fails: bool = False) -> None:
-        self.told, self.fails = told, fails
+    def __init__(self, calls: list[object], fails: bool = False) -> None:
+        self.calls, self.fails = calls, fails
 
     def begin(self, header: Header) -> None:
-        self.told.append(header)
+        self.calls.append(header)
         if self.fails:
             raise ValueError("no room")
 
     def take(self, rows: np.ndarray) -> None:
-        self.told.append(rows.copy())
+        self.calls.append(rows.copy())
 
     def end(self, ending: Ending) -> None:
-        self.told.append(ending)
+        self.calls.append(ending)
 
 
 def test_rows_show_the_solution_from_the_start_to_the_end(system: System):
@@ -58,9 +58,9 @@ def test_rows_show_the_solution_from_the_start_to_the_end(system: System):
 
 
 def test_observers_are_told_header_rows_and_end(system: System):
-    told: list[object] = []
-    ending = simulate_plan(make_plan(system, EXPERIMENT), [Watching(told)])
-    header, *blocks, last = told
+    calls: list[object] = []
+    ending = simulate_plan(make_plan(system, EXPERIMENT), [Watching(calls)])
+    header, *blocks, last = calls
     assert header.parameters[PortName.read("sine.x1")] == 1.0
     assert header.experiment == replace(EXPERIMENT, order="feedthrough")
     assert np.vstack(blocks).shape == (9, 1 + len(header.columns))
@@ -68,10 +68,10 @@ def test_observers_are_told_header_rows_and_end(system: System):
 
 
 def test_an_observer_that_fails_keeps_no_other_from_its_end(system: System):
-    told: list[object] = []
+    calls: list[object] = []
     with pytest.raises(ValueError, match="no room"):
-        simulate_plan(make_plan(system, EXPERIMENT), [Watching(told), Watching([], fails=True)])
-    header, ending = told
+        simulate_plan(make_plan(system, EXPERIMENT), [Watching(calls), Watching([], fails=True)])
+    header, ending = calls
     assert isinstance(header, Header) and mentions(ending.failure, "no room")
 
 

@@ -115,11 +115,11 @@ def test_stages_of_four_components_in_a_loop(fmus, wires, steps, order, passing,
     system = system_of(fmus, wires, steps=steps)
     plan = make_plan(system, Experiment(1.0, 0.1, order))
     found = stages_of(system, plan.arrangement, plan.decimations)
-    assert list(map(told, found.stepping)) == stepping
-    assert (found.passing and list(map(told, found.passing))) == passing
+    assert list(map(described, found.stepping)) == stepping
+    assert (found.passing and list(map(described, found.passing))) == passing
 
 
-def told(stage: Stage) -> str:
+def described(stage: Stage) -> str:
     """Describe a stage; a component with all of its work has only its name."""
     when = "" if stage.decimation is None else f"{stage.decimation.every} "
     when += "end " if stage.decimation and stage.decimation.at_end else ""
@@ -127,10 +127,10 @@ def told(stage: Stage) -> str:
         return f"{when}show {' '.join(map(str, stage.shows))}"
     taken = " ".join(str(connection.target) for connection in stage.connections)
     done = [
-        f"{one.component}{'' if one == Visit(one.component) else f'({how(one)})'}"
-        for one in stage.visits
+        f"{visit.component}{'' if visit == Visit(visit.component) else f'({how(visit)})'}"
+        for visit in stage.visits
     ]
-    done += [f"{one.how} {'-'.join(one.ring)}" for one in stage.closings]
+    done += [f"{closing.how} {'-'.join(closing.ring)}" for closing in stage.closings]
     return " ".join([f"{when}{taken}:", *done])
 
 
@@ -164,8 +164,8 @@ def test_in_feedthrough_order_each_value_is_moved_as_often_as_it_is_needed(tmp_p
 
     def calls(some: list[LinkedStage]) -> list[list[str]]:
         return [
-            [" ".join([one.instance.name, *one.set_inputs, *[one.do_step] * bool(one.do_step),
-                       *one.get_outputs]) for one in stage.members]
+            [" ".join([own.instance.name, *own.set_inputs, *[own.do_step] * bool(own.do_step),
+                       *own.get_outputs]) for own in stage.members]
             for stage in some
         ]  # fmt: skip
 

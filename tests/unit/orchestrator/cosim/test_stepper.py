@@ -73,16 +73,16 @@ def test_a_cache_that_cannot_be_written_is_named(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("said", "heard"), [("no licence", "no licence"), (r"\377 licence", "\ufffd licence")]
+    ("complaint", "quoted"), [("no licence", "no licence"), (r"\377 licence", "\ufffd licence")]
 )
-def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, said, heard):
+def test_a_compiler_that_fails_is_quoted(tmp_path, cache, monkeypatch, complaint, quoted):
     """Even if its message is not text."""
     compiler = tmp_path / "cc"
-    compiler.write_text(f"#!/bin/sh\necho first >&2\nprintf '{said}' >&2\nexit 1\n")
+    compiler.write_text(f"#!/bin/sh\necho first >&2\nprintf '{complaint}' >&2\nexit 1\n")
     compiler.chmod(0o755)
     monkeypatch.setenv("PATH", str(tmp_path))
     assert loop.choose_loop("auto", steps(100_000)).name == "python"
-    with pytest.raises(InputError, match=f"the loop cannot be compiled: {heard}"):
+    with pytest.raises(InputError, match=f"the loop cannot be compiled: {quoted}"):
         loop.choose_loop("compiled", steps(1))
     assert list(cache.iterdir()) == []
 

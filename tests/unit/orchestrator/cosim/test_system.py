@@ -201,7 +201,7 @@ def test_a_list_for_a_group_of_several_components_is_of_each(fleet):
 
 
 @pytest.mark.parametrize(
-    ("value", "said"),
+    ("value", "words"),
     [
         ({"each": [1.0]}, "3 values"),
         ({"each": 1.0}, "3 values"),
@@ -209,8 +209,8 @@ def test_a_list_for_a_group_of_several_components_is_of_each(fleet):
         ({"first": 1.0, "step": float("nan")}, "finite"),
     ],
 )
-def test_values_of_several_components_must_be_as_many(fleet, value, said):
-    with pytest.raises(InputError, match=rf"auv\*\.a\.k.*{said}"):
+def test_values_of_several_components_must_be_as_many(fleet, value, words):
+    with pytest.raises(InputError, match=rf"auv\*\.a\.k.*{words}"):
         fleet.with_parameters({"auv*.a.k": value})
 
 
@@ -358,13 +358,13 @@ def test_stages_keep_the_order_of_every_feedthrough(graph, random, are_solved):
     stages = system.in_stages(order, solved)
     stage_of = {name: i for i, stage in enumerate(stages) for name in stage}
     assert sorted(name for stage in stages for name in stage) == sorted(names)
-    one = {frozenset(ring) for ring in solved}
+    rings = {frozenset(ring) for ring in solved}
     for a, b in through:
-        if not any({a, b} <= ring for ring in one) and order.index(a) < order.index(b):
+        if not any({a, b} <= ring for ring in rings) and order.index(a) < order.index(b):
             assert stage_of[a] < stage_of[b]
-    for ring in one:
+    for ring in rings:
         assert len({stage_of[name] for name in ring}) == 1
-    members = frozenset().union(*one)
+    members = frozenset().union(*rings)
     assert all(members.issuperset(stage) or members.isdisjoint(stage) for stage in stages)
     if not are_solved:
         assert [name for stage in stages for name in stage] == order

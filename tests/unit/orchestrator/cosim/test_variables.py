@@ -113,7 +113,7 @@ def test_an_item_of_an_enumeration_may_be_named():
 
 
 @pytest.mark.parametrize(
-    ("of", "value", "words"),
+    ("declared", "value", "words"),
     [
         (variable("Real"), "1_000", "1_000"),
         (variable("Real"), "\u0661", "x"),
@@ -141,18 +141,18 @@ def test_an_item_of_an_enumeration_may_be_named():
         pytest.param(variable("String"), "\ud800", "x", id="half a pair"),
     ],
 )
-def test_what_the_variable_cannot_have_is_refused_by_name(of, value, words):
+def test_what_the_variable_cannot_have_is_refused_by_name(declared, value, words):
     with pytest.raises(InputError) as error:
-        of.typed(value, "x")
+        declared.typed(value, "x")
     assert mentions(str(error.value), f"x {words}")
 
 
 def test_limits_themselves_are_taken():
-    for of, limits in (
+    for declared, limits in (
         (variable("Real", "0", "2.5"), (0.0, 2.5)),
         (variable("Integer", "-9999999999", "9999999999"), (-(2**31), 2**31 - 1)),
     ):
-        assert tuple(of.typed(value, "x") for value in limits) == limits
+        assert tuple(declared.typed(value, "x") for value in limits) == limits
 
 
 def test_a_value_of_another_type_is_none_of_the_variable():

@@ -58,12 +58,12 @@ def test_lines_do_not_depend_on_the_order_of_evaluation(figure):
     table = loop_table(order="gauss-seidel")
     acting = (*STANDARD.commanded, *STANDARD.dy_hat, *STANDARD.theta_hat)
     for rows in FIGURES[figure].values():
-        one, other = (
+        first, second = (
             [line.tolist() for axes in compose("", rows, [Drawn("run", each)])[0].axes
              for line in lines(axes)]
             for each in (table, at_its_time(table, acting))
         )  # fmt: skip
-        assert one == other
+        assert first == second
 
 
 @pytest.mark.parametrize("z_up", [False, True])
@@ -157,7 +157,7 @@ def test_long_names_leave_the_panels_their_room(kind, n):
     for axes in figure.axes:
         assert axes.get_position().width > 0.3
         legends = filter(None, [axes.get_legend()])
-        titles = (axes.title, *(one.get_title() for one in legends))
+        titles = (axes.title, *(legend.get_title() for legend in legends))
         for part in (axes, *axes.texts, *titles):
             assert not box.overlaps(part.get_window_extent())
         for text in axes.texts:
@@ -271,8 +271,8 @@ def test_events_have_numbers_in_the_panels_and_their_names_below_the_figure():
 def test_events_leave_the_axes_as_they_are():
     table = with_events(Occurrence(2.0, "stop", "power lost", 1))
     limits = [
-        panel(compose("", FIGURES["comparison"][""], [Drawn("run", one)])[0], "$e_x$ [m]")
-        for one in (table, loop_table())
+        panel(compose("", FIGURES["comparison"][""], [Drawn("run", shown)])[0], "$e_x$ [m]")
+        for shown in (table, loop_table())
     ]
     assert limits[0].get_ylim() == limits[1].get_ylim()
 
@@ -310,8 +310,8 @@ def test_an_event_has_its_own_end_if_another_text_begins_alike():
         Occurrence(7.0, "pulse, ended", event=4),
     ]
     figure, _ = compose("", FIGURES["comparison"][""], [Drawn("run", with_events(*events))])
-    said = figure.get_supxlabel().replace("\n", " ")
-    assert said.startswith(
+    label = figure.get_supxlabel().replace("\n", " ")
+    assert label.startswith(
         "1: for ever, 1 s; 2: both, 2 to 3 s; 3: one, 3.5 to 6 s; 4: ten, 4 to 5 s; "
         "5: pulse, 6 to 7 s"
     )

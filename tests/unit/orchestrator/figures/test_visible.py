@@ -68,9 +68,9 @@ def test_extremes_of_each_division_are_kept(seed, n, block, watched):
 @pytest.mark.parametrize("block", [7, 4096])
 def test_rows_do_not_depend_on_the_size_of_blocks(n, block):
     rows = random_rows(2, n)
-    one, other = seen_of(rows, 512), seen_of(rows, block)
-    assert one.rows.tobytes() == other.rows.tobytes()
-    assert one.means.rows.tobytes() == other.means.rows.tobytes()
+    first, second = seen_of(rows, 512), seen_of(rows, block)
+    assert first.rows.tobytes() == second.rows.tobytes()
+    assert first.means.rows.tobytes() == second.means.rows.tobytes()
 
 
 @pytest.mark.parametrize("n", [1, 50, WHOLE])

@@ -30,16 +30,16 @@ def users(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def contents(found: dict[Path, bytes]) -> dict[str, bytes]:
-    return {path.name: content for path, content in found.items()}
+def contents(files: dict[Path, bytes]) -> dict[str, bytes]:
+    return {path.name: content for path, content in files.items()}
 
 
 def is_refused(users: Path, culprit: Path) -> None:
     """Check that nothing is read from the user's folder, and that one warning gives the reason."""
-    with pytest.warns(UserWarning, match="only you can write") as said:
+    with pytest.warns(UserWarning, match="only you can write") as warnings:
         found = read_cached("kind", "0")
     assert not any(path.is_relative_to(users) for path in found)
-    assert str(culprit) in str(said[0].message)
+    assert str(culprit) in str(warnings[0].message)
     with pytest.warns(UserWarning, match="only you can write"):
         [*paths] = write_cached("kind", "0", CONTENT)
     assert all(path.is_relative_to(process_folder()) for path in paths)
@@ -184,8 +184,8 @@ def test_the_current_folder_is_never_the_cache(workplace, monkeypatch, variables
         "except OSError: pass\n"
     )
     command = [sys.executable, "-W", "ignore", "-c", code]
-    said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
-    assert str(workplace) not in said
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert str(workplace) not in output
     assert not list(workplace.iterdir())
 
 

@@ -37,11 +37,11 @@ def test_figures_are_the_same_whatever_a_matplotlibrc_says(workplace, plain, con
         os.mkfifo("matplotlibrc")
     else:
         Path("matplotlibrc").write_bytes(content)
-    said = subprocess.run(
+    output = subprocess.run(
         [sys.executable, "-P", "-m", "orchestrator", "run", "fig4", "--stop-time", "0.2"],
         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, timeout=100, check=True,
     ).stderr  # fmt: skip
-    assert said == b""
+    assert output == b""
     assert figures(workplace / "results" / "fig4") == plain
 
 
@@ -66,10 +66,10 @@ def test_workers_do_not_read_it(workplace):
         "        print(dict(some.results({0: size}, 'run')))\n"
     )
     (workplace / "program.py").write_text(code)
-    said = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "program.py"], stdout=subprocess.PIPE, text=True, timeout=100, check=True
     )
-    assert said.stdout == "{0: 10.0}\n"
+    assert process.stdout == "{0: 10.0}\n"
 
 
 @pytest.mark.slow

@@ -213,14 +213,16 @@ def test_other_library_is_refused(other: bytes):
 def test_command_file_knows_it(tmp_path: Path):
     path = tmp_path / "library"
     path.write_bytes(universal([thin(name, 100) for name in PROCESSORS]))
-    said = subprocess.run(["file", path], check=True, capture_output=True, text=True).stdout
-    assert "universal binary with 2 architectures" in said
-    assert "x86_64" in said
-    assert "arm64" in said
+    output = subprocess.run(["file", path], check=True, capture_output=True, text=True).stdout
+    assert "universal binary with 2 architectures" in output
+    assert "x86_64" in output
+    assert "arm64" in output
 
 
 def test_compilers_evaluate_no_function_whose_result_is_rounded():
-    rounded = {name for name, one in FUNCTIONS.items() if one.is_rounded and not one.factor}
+    rounded = {
+        name for name, function in FUNCTIONS.items() if function.is_rounded and not function.factor
+    }
     assert set(ROUNDED) == rounded
 
 
@@ -259,7 +261,7 @@ MACHINES = {
 
 @pytest.mark.parametrize("fmi", FOLDERS)
 def test_all_platforms_have_the_names_of_the_standard(fmi: str):
-    assert {found.name: found.ending for found in platforms(fmi, "all")} == FOLDERS[fmi]
+    assert {platform.name: platform.ending for platform in platforms(fmi, "all")} == FOLDERS[fmi]
 
 
 @pytest.mark.parametrize("machine", MACHINES, ids=" ".join)
@@ -269,8 +271,8 @@ def test_default_platform_is_this_machine(fmi, machine, monkeypatch: pytest.Monk
     monkeypatch.setattr(platform, "system", lambda: machine[1])
     names = MACHINES[machine][list(FOLDERS).index(fmi)]
     if names:
-        assert [found.name for found in platforms(fmi)] == names
-        assert all(this_machine() in found.machines for found in platforms(fmi))
+        assert [platform.name for platform in platforms(fmi)] == names
+        assert all(this_machine() in platform.machines for platform in platforms(fmi))
     else:
         with pytest.raises(ValueError, match=f"no platform for this machine, {machine[0]}-"):
             platforms(fmi)
@@ -278,7 +280,7 @@ def test_default_platform_is_this_machine(fmi, machine, monkeypatch: pytest.Monk
 
 def test_names_may_be_given_in_any_order_and_twice():
     wanted = platforms("2", "win64, linux64,win64")
-    assert [found.name for found in wanted] == ["linux64", "win64"]
+    assert [platform.name for platform in wanted] == ["linux64", "win64"]
 
 
 def test_library_of_macos_is_for_both_of_its_processors():

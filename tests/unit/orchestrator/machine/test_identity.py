@@ -26,6 +26,6 @@ def test_the_digest_of_code_has_every_file_and_its_place(tmp_path, monkeypatch):
 
 
 def test_what_differs_is_named_in_order():
-    one, other = {"a": "1", "b": "2", "c": "3"}, {"b": "2", "c": "4", "d": "1"}
-    assert identity.differences(one, other) == ["a", "c", "d"]
-    assert identity.digest_of(one, other) != identity.digest_of(other, one)
+    first, second = {"a": "1", "b": "2", "c": "3"}, {"b": "2", "c": "4", "d": "1"}
+    assert identity.differences(first, second) == ["a", "c", "d"]
+    assert identity.digest_of(first, second) != identity.digest_of(second, first)

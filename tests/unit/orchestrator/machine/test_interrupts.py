@@ -13,13 +13,13 @@ from orchestrator.machine.interrupts import Interrupts, held_interrupts, orderly
 
 
 def test_signals_are_collected_and_announced_at_once():
-    said: list[bool] = []
-    with held_interrupts(lambda interrupts: said.append(interrupts.urgent)) as interrupts:
+    urgent: list[bool] = []
+    with held_interrupts(lambda interrupts: urgent.append(interrupts.urgent)) as interrupts:
         assert not interrupts
         os.kill(os.getpid(), signal.SIGINT)
         os.kill(os.getpid(), signal.SIGINT)
         assert interrupts
-    assert said == [False, True]
+    assert urgent == [False, True]
 
 
 def test_signals_of_a_batch_system_are_urgent():

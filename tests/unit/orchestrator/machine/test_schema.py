@@ -95,7 +95,7 @@ def test_entries_have_the_order_and_keys_of_the_file():
     assert found["back"].meaning == "Whether back." and found["back"].default == "no"
     assert mentions(found["times"].type, "1 1,000") and mentions(found["pace"].type, "slow fast")
     # An optional entry cannot be None, which TOML lacks.
-    assert not any("None" in one.type for one in found.values())
+    assert not any("None" in field.type for field in found.values())
 
 
 class Loose(TomlTable):

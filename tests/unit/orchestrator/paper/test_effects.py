@@ -30,7 +30,7 @@ def test_names_differ():
 
 
 @pytest.mark.parametrize(
-    ("name", "metrics", "told"),
+    ("name", "metrics", "numbers"),
     [
         (
             "effect-disturbance",
@@ -61,9 +61,9 @@ def test_names_differ():
         ),
     ],
 )
-def test_the_text_has_the_numbers(tables, name, metrics, told):
+def test_the_text_has_the_numbers(tables, name, metrics, numbers):
     [effect] = [effect for effect in EFFECTS if effect.name == name]
-    assert tells(effect.show(*made(tables[name], *metrics))[0], *told)
+    assert tells(effect.show(*made(tables[name], *metrics))[0], *numbers)
 
 
 def test_step(tables):

@@ -55,7 +55,7 @@ NOT_ADDED = (
 
 
 @pytest.mark.parametrize(
-    ("body", "wanted"), [*((one, True) for one in ADDED), *((one, False) for one in NOT_ADDED)]
+    ("body", "wanted"), [*((body, True) for body in ADDED), *((body, False) for body in NOT_ADDED)]
 )
 def test_noise_is_added_as_a_term_that_depends_on_nothing_else(body, wanted, tmp_path):
     module = module_of(TEXT.replace("BODY", body), tmp_path)

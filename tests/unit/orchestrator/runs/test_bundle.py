@@ -114,9 +114,9 @@ def test_auto_is_python_with_a_compiler_that_fails_and_says_so(builds, monkeypat
         build(module, folder, *options)
 
     monkeypatch.setattr(bundle, "run_fmus", fails)
-    with pytest.warns(UserWarning, match="Python kind .* because cc makes no AuvPlant") as said:
+    with pytest.warns(UserWarning, match="Python kind .* because cc makes no AuvPlant") as warnings:
         assert auto() == "python"
-    assert len(said) == 1
+    assert len(warnings) == 1
 
 
 def test_fmus_that_came_with_the_installation_are_taken_if_they_fit_it(

@@ -76,8 +76,8 @@ def test_network_of_an_npz_computes_the_numbers_of_numpy(tmp_path: Path, activat
 
 def test_default_activations_are_tanh_and_none_in_the_last_layer(tmp_path: Path):
     np.savez(tmp_path / "policy.npz", **weights())
-    said = [layer.activation for layer in read_network(tmp_path / "policy.npz").layers]
-    assert said == ["tanh", "tanh", "none"]
+    activations = [layer.activation for layer in read_network(tmp_path / "policy.npz").layers]
+    assert activations == ["tanh", "tanh", "none"]
 
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -98,8 +98,8 @@ def test_both_kinds_give_the_same_bits(tmp_path: Path):
     for x in random.normal(size=(50, 4)) * 10.0 ** random.integers(-5, 6, size=(50, 1)):
         answer = both.python("outputs", [*x])
         assert answer.bits == both.c("outputs", [*x]).bits
-        for W, b, activation, said in layers:
-            x = FUNCTIONS[activation](W @ x + b, *said)
+        for W, b, activation, constants in layers:
+            x = FUNCTIONS[activation](W @ x + b, *constants)
         np.testing.assert_allclose(answer.numbers, x, rtol=1e-12, atol=1e-13)
 
 
@@ -392,9 +392,9 @@ def exported(path: Path, name: str) -> list[Any]:
                 np.array(ast.literal_eval(sizes)) if sign == "=" else drawn.astype(np.float32)
             )
             continue
-        (operator, *inputs), (output, *said) = (part.split() for part in line.split(" > "))
+        (operator, *inputs), (output, *options) = (part.split() for part in line.split(" > "))
         domain, _, operator = operator.rpartition(":")
-        attributes = {k: ast.literal_eval(v) for k, v in (one.split("=") for one in said)}
+        attributes = {k: ast.literal_eval(v) for k, v in (option.split("=") for option in options)}
         if "value" in attributes:
             array = np.array(attributes["value"])
             array = array.astype(np.float32) if array.dtype.kind == "f" else array
@@ -566,7 +566,7 @@ class Graph:
 
     def bounds(self) -> list[str]:
         chosen = self.one_of([(0, 0), (1, 0), (0, 1), (1, 1)])
-        return [self.constant(*self.one_of([(), (), (2,)])) if one else "" for one in chosen]
+        return [self.constant(*self.one_of([(), (), (2,)])) if choice else "" for choice in chosen]
 
     def moments(self) -> list[str]:
         """Inputs of a BatchNormalization; variances are not negative."""
@@ -753,9 +753,9 @@ def test_any_name_of_a_file_gives_a_module(tmp_path: Path, name: str):
     (tmp_path / "policy.py").write_text(text, encoding="utf-8")
     tree = ast.parse((tmp_path / "policy.py").read_bytes())
     assert ast.unparse(tree.body[1]) == "from __future__ import annotations"
-    said = ast.get_docstring(tree)
-    assert said is not None
-    [shown] = re.findall("`(.*?)` by `auv-fmu new", said)
+    words = ast.get_docstring(tree)
+    assert words is not None
+    [shown] = re.findall("`(.*?)` by `auv-fmu new", words)
     assert shown.isprintable()
 
 

@@ -204,9 +204,9 @@ def test_impossible_commands_are_refused_in_one_line(tmp_path, monkeypatch, caps
     write(tmp_path)
     (tmp_path / "slave.py").write_text("class Own:\n    pass\n")
     assert main(arguments) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert why in said
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert why in message
 
 
 def test_check_lists_problems(tmp_path, monkeypatch, capsys):

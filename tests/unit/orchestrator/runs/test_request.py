@@ -65,7 +65,8 @@ def hints(function: Callable[..., Any]) -> dict[str, Any]:
     """The types and defaults of arguments."""
     types = get_type_hints(function)
     return {
-        name: (types[name], one.default) for name, one in signature(function).parameters.items()
+        name: (types[name], parameter.default)
+        for name, parameter in signature(function).parameters.items()
     }
 
 
@@ -79,15 +80,17 @@ def hints(function: Callable[..., Any]) -> dict[str, Any]:
 def test_every_option_gives_its_value_and_its_default(add, declared, others):
     parser = argparse.ArgumentParser(add_help=False)
     add(parser)
-    names = {option[2:].split()[0].replace("-", "_") for one in declared for option in GIVEN[one]}
+    names = {
+        option[2:].split()[0].replace("-", "_") for group in declared for option in GIVEN[group]
+    }
     assert {action.dest for action in parser._actions} == names | others
-    for one in declared:
-        assert from_options(one, parser.parse_args(["fig4"])) == one()
-        for option, value in GIVEN[one].items():
+    for group in declared:
+        assert from_options(group, parser.parse_args(["fig4"])) == group()
+        for option, value in GIVEN[group].items():
             name, *_ = words = option.split()
-            found = from_options(one, parser.parse_args(["fig4", *words]))
+            found = from_options(group, parser.parse_args(["fig4", *words]))
             attribute = name[2:].replace("-", "_")
-            assert getattr(found, attribute) == value != getattr(one(), attribute)
+            assert getattr(found, attribute) == value != getattr(group(), attribute)
 
 
 @pytest.mark.parametrize("wrong", ["--kind nativ", "--loop fast", "--step often", "--format xls"])
@@ -109,10 +112,10 @@ def test_times_that_are_not_positive_are_refused(name, value):
 def test_simulate_has_the_options_as_keywords_with_their_types():
     taken = hints(simulate)
     assert [*taken][:2] == ["system", "parameters"]
-    assert taken.keys() - OF_SIMULATE == {one.name for one in fields(Options)}
+    assert taken.keys() - OF_SIMULATE == {field.name for field in fields(Options)}
     assert taken["stop_time"] == (float | None, None)
     assert taken["steps"] == (Mapping[str, float], {})
-    kinds = {one.kind for one in [*signature(simulate).parameters.values()][2:]}
+    kinds = {parameter.kind for parameter in [*signature(simulate).parameters.values()][2:]}
     assert kinds == {Parameter.KEYWORD_ONLY}
 
 
@@ -127,8 +130,8 @@ def test_wrong_arguments_are_type_errors_of_the_function():
 
 def test_keywords_of_sweep_are_the_means():
     types = get_type_hints(Means)
-    taken = {name: one for name, one in hints(sweep).items() if name not in OF_SWEEP}
-    assert taken == {one.name: (types[one.name], one.default) for one in fields(Means)}
+    taken = {name: hint for name, hint in hints(sweep).items() if name not in OF_SWEEP}
+    assert taken == {field.name: (types[field.name], field.default) for field in fields(Means)}
 
 
 def test_every_keyword_arrives(monkeypatch):

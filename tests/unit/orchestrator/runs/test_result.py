@@ -75,14 +75,14 @@ def test_stored_result_is_the_same_again(result, tmp_path):
             _ = again.system
 
 
-def is_the_same(one: Result, other: Result) -> bool:
+def is_the_same(first: Result, second: Result) -> bool:
     return (
-        np.array_equal(one.rows, other.rows)
-        and repr(one) == repr(other)
-        and one.metrics() == other.metrics()
-        and dict(one.parameters) == dict(other.parameters)
-        and one.events == other.events
-        and str(one.system) == str(other.system)
+        np.array_equal(first.rows, second.rows)
+        and repr(first) == repr(second)
+        and first.metrics() == second.metrics()
+        and dict(first.parameters) == dict(second.parameters)
+        and first.events == second.events
+        and str(first.system) == str(second.system)
     )
 
 
@@ -94,7 +94,7 @@ def test_a_copied_result_is_the_same(tmp_path, loop):
     made = simulate("fig4", stop_time=0.1, events=events, loop=loop)
     for again in (deepcopy(made), pickle.loads(pickle.dumps(made))):
         assert is_the_same(again, made)
-        folders = [one.save(tmp_path / name) for one, name in ((made, "made"), (again, "again"))]
+        folders = [kept.save(tmp_path / name) for kept, name in ((made, "made"), (again, "again"))]
         for name in ("result.csv", "metrics.json"):
             first, second = ((folder / name).read_bytes() for folder in folders)
             assert first == second
@@ -155,16 +155,16 @@ def test_results_are_drawn_over_each_other(result):
             assert np.array_equal(line.get_ydata(), run[f"planner.y_d.{axis}"])
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert labels == ["fig4 (1)", "fig4 (2)", "fig4 (3)"]
-    told = result.plot("planner.y_d", other).legends[0].get_texts()
-    assert [text.get_text() for text in told] == ["planner.eta0.z = -2", "planner.eta0.z = -3"]
+    texts = result.plot("planner.y_d", other).legends[0].get_texts()
+    assert [text.get_text() for text in texts] == ["planner.eta0.z = -2", "planner.eta0.z = -3"]
 
 
 def test_figure_is_the_one_that_the_command_line_draws(result, tmp_path):
     arguments = ["run", "fig4", "--stop-time", "0.1", "--out", str(tmp_path / "written")]
     assert main(arguments) == 0
     for name, file in ((None, "fig4.svg"), ("tracking-velocity", "fig4-velocity.svg")):
-        for one in (result, read(tmp_path / "written")):
-            save(one.figure(name=name), tmp_path / "mine.svg")
+        for shown in (result, read(tmp_path / "written")):
+            save(shown.figure(name=name), tmp_path / "mine.svg")
             assert (tmp_path / "mine.svg").read_bytes() == (
                 tmp_path / "written" / file
             ).read_bytes()

@@ -72,10 +72,10 @@ def test_simulate_and_the_command_line_report_mistakes_in_the_same_words(
 ):
     out = str(tmp_path / "out")
     assert main(["run", "fig4", "--set", f"{name}={value}", "--out", out]) == 2
-    said = capsys.readouterr().err.strip().removeprefix("auv-fmu: ")
+    message = capsys.readouterr().err.strip().removeprefix("auv-fmu: ")
     with pytest.raises(ValueError, match=r".") as mistake:
         simulate("fig4", {name: str(value)})
-    assert str(mistake.value) == said
+    assert str(mistake.value) == message
 
 
 @pytest.mark.parametrize(

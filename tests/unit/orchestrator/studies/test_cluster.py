@@ -64,8 +64,8 @@ def scheduler(tmp_path):
 
 
 def worker(address, folder):
-    one = ("--no-nanny", "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1")
-    return started("worker", address, *one, "--local-directory", folder)
+    options = ("--no-nanny", "--nthreads", "1", "--no-dashboard", "--host", "127.0.0.1")
+    return started("worker", address, *options, "--local-directory", folder)
 
 
 @pytest.mark.slow

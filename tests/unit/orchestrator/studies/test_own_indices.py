@@ -73,12 +73,12 @@ def study(
     folder: Path, text: str = SETTLING, name: str = "settling", **changes: object
 ) -> tuple[Path, Path]:
     """A study, and the file of an index beside it."""
-    of = {
+    settings = {
         "scenario": "fig4", "stop_time": 10.0, "varies": "plant.eta0.z", "values": [-2.0, 3.0],
         "show": f'"{name}"',
     } | changes  # fmt: skip
     file, index = folder / "mine.toml", folder / f"{name}.py"
-    file.write_text(STUDY.format(**of))
+    file.write_text(STUDY.format(**settings))
     index.write_text(text)
     return file, index
 
@@ -149,7 +149,7 @@ def test_an_exception_of_an_index_is_the_failure_of_a_run(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("before", "after", "told"),
+    ("before", "after", "words"),
     [
         ("plant.eta.z", "plant.etta.z", "settling.py: fig4 has no plant.etta.z; did you mean pl"),
         ('"m", "Depth", name="plant.eta.z"', '"1", "Roll", name="plant.roll"', "type Boolean, n"),
@@ -161,12 +161,12 @@ def test_an_exception_of_an_index_is_the_failure_of_a_run(tmp_path):
         ("from math import nan", "from math import nan\nimport beside", "No module named 'beside'"),
     ],
 )  # fmt: skip
-def test_a_mistake_is_reported_before_the_first_run(tmp_path, before, after, told):
+def test_a_mistake_is_reported_before_the_first_run(tmp_path, before, after, words):
     assert before in SETTLING
     file, _ = study(tmp_path, SETTLING.replace(before, after))
     with pytest.raises(Refused) as raised:
         prepare_study(read_study(str(file)), Means(kind="native"))
-    assert told in str(raised.value)
+    assert words in str(raised.value)
 
 
 def test_an_index_is_one_file(tmp_path):

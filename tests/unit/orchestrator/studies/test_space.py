@@ -201,10 +201,10 @@ def test_stop_time_and_step_vary():
 
 
 def test_other_points_have_another_digest():
-    one, same, other = (
+    first, same, other = (
         space(vary={"plant.eta0.y": values}) for values in ([1.0, 2.0], [1, 2], [1.0, 3.0])
     )
-    assert one.digest == same.digest != other.digest
+    assert first.digest == same.digest != other.digest
 
 
 @pytest.mark.parametrize(

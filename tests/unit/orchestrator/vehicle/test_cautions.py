@@ -33,11 +33,11 @@ def test_passing_the_vertical_without_roll_is_reported(scenario, parameters, sto
     watch = Watch()
     watch.begin(result.header)
     watch.take(result.rows)
-    said = [one.text for one in watch.found() if one.kind == VERTICAL]
+    texts = [caution.text for caution in watch.found() if caution.kind == VERTICAL]
     if "plant.roll" in parameters and beyond.any():
         time = result.time[beyond.argmax()]
-        [line] = said
+        [line] = texts
         assert f"by t = {time:g} s, where (1) has a pole" in line and "plant.roll" in line
     else:
-        assert not said
+        assert not texts
     assert beyond.any() == (scenario != "fig4" and stop_time > 1.0)

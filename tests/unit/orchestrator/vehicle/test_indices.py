@@ -66,7 +66,7 @@ def table_with(signals=SIGNALS, order="feedthrough", more=()) -> Table:
     values = {STANDARD.ell: ELL, **ends, **dict(more)}
     parameters = {PortName.read(name): value for name, value in values.items()}
     header = Header(tuple(signals), Experiment(T, H, order), parameters)
-    return Table.of(header, np.column_stack([TIME, *(of(TIME) for of in signals.values())]))
+    return Table.of(header, np.column_stack([TIME, *(signal(TIME) for signal in signals.values())]))
 
 
 def indices_of(table: Table, blocks=1):
@@ -89,7 +89,7 @@ def noise() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
         name: random.normal(scale=3.0, size=len(TIME))
         for name in (*SIGNALS, *STANDARD.commanded, *STANDARD.applied)
     }
-    return {name: lambda t, of=of: of for name, of in values.items()}
+    return {name: lambda t, signal=signal: signal for name, signal in values.items()}
 
 
 def test_indices_of_known_signals():
@@ -165,10 +165,10 @@ def test_closed_loop_has_all_indices():
     assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
 
 
-@pytest.mark.parametrize("module", [*iter_modules(index.__path__)], ids=lambda one: one.name)
+@pytest.mark.parametrize("module", [*iter_modules(index.__path__)], ids=lambda module: module.name)
 def test_an_index_is_in_the_language_of_equations(module):
-    of = read_reducer(import_module(f"{index.__name__}.{module.name}"))
-    assert Program(*of.hooks.values()).mistakes == []
+    reducer = read_reducer(import_module(f"{index.__name__}.{module.name}"))
+    assert Program(*reducer.hooks.values()).mistakes == []
 
 
 def test_a_new_index_is_one_entry(monkeypatch, tmp_path):

@@ -107,16 +107,16 @@ def rows() -> np.ndarray:
     return np.column_stack((0.5 * k - 1.0, k % 4, 1.0 * k, k % 2))
 
 
-def reduced(of: Header, blocks: int = 1, last: float | None = None) -> Reduction:
-    [one] = reductions_of([reducer_with(last)], [STANDARD], of)[STANDARD].values()
+def reduced(head: Header, blocks: int = 1, last: float | None = None) -> Reduction:
+    [fold] = reductions_of([reducer_with(last)], [STANDARD], head)[STANDARD].values()
     for block in np.array_split(rows(), blocks):
-        one.take(block)
-    return one
+        fold.take(block)
+    return fold
 
 
-def state(one: Reduction) -> State:
+def state(fold: Reduction) -> State:
     # These hooks are outside the language, so they run in Python.
-    return one._reducing._state
+    return fold._reducing._state
 
 
 @pytest.mark.parametrize("blocks", [1, 4, N])
@@ -148,26 +148,26 @@ def test_only_the_last_seconds_count(blocks):
 @pytest.mark.parametrize("blocks", [1, 4, N])
 @pytest.mark.parametrize("last", [None, 100.0])
 def test_exception_of_a_hook_is_reported_with_its_time(blocks, last):
-    one = reduced(header(k=13.0), blocks, last)
-    assert one.found() == {}
-    assert one.failure == "own: at t = 5.5 s: ValueError: thirteen"
+    fold = reduced(header(k=13.0), blocks, last)
+    assert fold.found() == {}
+    assert fold.failure == "own: at t = 5.5 s: ValueError: thirteen"
 
 
 def test_inputs_have_the_names_of_the_loop():
     fleet = AllocatedLoop("a.plant", "a.law", "a.planner", allocation="a.fins")
-    of = header(loop=fleet)
-    values = {str(name): value for name, value in of.parameters.items()}
-    found = sources_of(reducer_with(), fleet, of.place, values)
+    head = header(loop=fleet)
+    values = {str(name): value for name, value in head.parameters.items()}
+    found = sources_of(reducer_with(), fleet, head.place, values)
     assert found.places == {"plant.x": 2, "plant.n": 1, "plant.is_on": 3}
     # With an allocation the applied signal follows from a state.
     assert found.constants == {"plant.mode": 3, "controller.k": 1.0, "plant.actuator.T.u": inf}
     assert fleet.port("plant.tau.u") == "a.fins.tau.u"
     assert fleet.port("sea.depth") == "sea.depth"
-    found = sources_of(reducer_with(), STANDARD, of.place, values)
+    found = sources_of(reducer_with(), STANDARD, head.place, values)
     assert found.missing == [
         "plant.x", "plant.n", "plant.is_on", "plant.mode", "controller.k"
     ]  # fmt: skip
-    assert reductions_of([reducer_with()], [STANDARD], of) == {STANDARD: {}}
+    assert reductions_of([reducer_with()], [STANDARD], head) == {STANDARD: {}}
 
 
 def test_a_parameter_that_is_not_a_number_is_refused():
@@ -179,7 +179,7 @@ def test_a_parameter_that_is_not_a_number_is_refused():
 @pytest.mark.parametrize("blocks", [1, 3])
 def test_compiled_indices_equal_their_hooks_in_python(order, blocks, monkeypatch):
     reducers = [*dict.fromkeys(index.reducer for index in INDICES), *WATCHED]
-    names = sorted({port.name for one in reducers for port in one.ports})
+    names = sorted({port.name for reducer in reducers for port in reducer.ports})
     signals = [name for name in names if name not in STANDARD.limits and name != STANDARD.ell]
     random = np.random.default_rng(7)
     values = np.column_stack((0.5 * np.arange(N) - 1.0, random.normal(size=(N, len(signals)))))
@@ -187,15 +187,15 @@ def test_compiled_indices_equal_their_hooks_in_python(order, blocks, monkeypatch
     parameters = {
         PortName.read(name): value for name, value in {**limits, STANDARD.ell: 0.3}.items()
     }
-    of = Header(tuple(signals), Experiment(9.0, 0.5, order, -1.0), parameters)
+    head = Header(tuple(signals), Experiment(9.0, 0.5, order, -1.0), parameters)
 
     def found() -> list[dict[str, list[float]]]:
-        made = reductions_of(reducers, [STANDARD], of)[STANDARD]
+        made = reductions_of(reducers, [STANDARD], head)[STANDARD]
         assert len(made) == len(reducers)
-        for one in made.values():
+        for fold in made.values():
             for block in np.array_split(values, blocks):
-                one.take(block)
-        return [one.found() for one in made.values()]
+                fold.take(block)
+        return [fold.found() for fold in made.values()]
 
     compiled = found()
     monkeypatch.setattr(reduction, "library_of", lambda reducer: None)

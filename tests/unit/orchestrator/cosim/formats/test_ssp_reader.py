@@ -214,10 +214,10 @@ def test_units_and_transformations_of_a_long_way_follow_from_each_hop(read: Read
 
 def test_a_value_that_nothing_changes_arrives_bit_for_bit(read: Read):
     elements = component("a", "m.fmu") + component("b", "m.fmu") + component("c")
-    [one, other] = read(
+    [first, second] = read(
         system(elements, connection("a.y", "b.u") + connection("c.y", "a.u"))
     ).connections
-    assert one.transformation is None and other.transformation is None
+    assert first.transformation is None and second.transformation is None
 
 
 def test_temperature_is_shifted_and_scaled(read: Read):
@@ -524,7 +524,7 @@ def test_valid_files_have_no_findings(read: Read):
 def _array(name: str, kind: str, *sizes: int) -> str:
     """A connector of SSP 2.0 for an array."""
     lengths = "".join(f'<ssc:Dimension size="{size}"/>' for size in sizes)
-    stated = connector(name, kind, of="Float64")
+    stated = connector(name, kind, type_="Float64")
     return stated.replace("</ssd:Connector>", f"{lengths}</ssd:Connector>")
 
 
@@ -729,12 +729,12 @@ def descriptions(draw) -> str:
 @given(description=descriptions(), unit=st.sampled_from(["m", "K", ""]))
 def test_ports_get_what_each_gets_that_is_followed_by_itself(description: str, unit: str):
     with tempfile.TemporaryDirectory() as folder:
-        one = fmu(
+        file = fmu(
             Path(folder, "a.fmu"),
             *(variable(f"u{i}", "input", unit=unit) for i in range(PORTS)),
             *(variable(f"y{i}", "output", unit=unit) for i in range(2)),
         )
-        path = archive(Path(folder, "x.ssp"), description, {"a.fmu": one})
+        path = archive(Path(folder, "x.ssp"), description, {"a.fmu": file})
         assert read_with(path, reader._Ports) == read_with(path, OneByOne)
 
 
@@ -745,7 +745,7 @@ def test_long_way_to_many_ports_is_gone_once(tmp_path: Path):
     ports = [f"a.u{i}" for i in range(n)]
     routes = [connection("a.y", "c0"), *(connection(*pair) for pair in pairwise(chain))]
     routes += [connection(chain[-1], port) for port in ports]
-    one = fmu(
+    file = fmu(
         tmp_path / "a.fmu",
         variable("y", "output"),
         *(variable(f"u{i}", "input") for i in range(n)),
@@ -753,7 +753,7 @@ def test_long_way_to_many_ports_is_gone_once(tmp_path: Path):
     text = described(
         system(component("a"), "".join(routes), "".join(connector(c, "inout") for c in chain))
     )
-    found = reader.read_ssp(archive(tmp_path / "x.ssp", text, {"a.fmu": one}))
+    found = reader.read_ssp(archive(tmp_path / "x.ssp", text, {"a.fmu": file}))
     assert found.connections == tuple(
         Connection(PortName("a", "y"), PortName("a", f"u{i}")) for i in range(n)
     )

@@ -89,8 +89,8 @@ def test_system_that_is_written_and_read_is_the_same(found: System, tmp_path: Pa
     assert again.steps == found.steps == {"inner.a b": 0.5}
     assert (again.start_time, again.stop_time) == (2.0, 3.0)
     contents = [
-        {name: part.fmu.read_bytes() for name, part in one.components.items()}
-        for one in (found, again)
+        {name: part.fmu.read_bytes() for name, part in version.components.items()}
+        for version in (found, again)
     ]
     assert contents[0] == contents[1]
 
@@ -312,8 +312,8 @@ def test_numbers_texts_and_names_are_read_as_they_were(
         made,
         parameters={PortName(second, port): value for port, value in values.items()},
         connections=tuple(
-            Connection(PortName(first, f"y_{of}"), PortName(first, f"u_{of}"), how)
-            for of, how in wires.items()
+            Connection(PortName(first, f"y_{kind}"), PortName(first, f"u_{kind}"), how)
+            for kind, how in wires.items()
         ),
         **{"start_time": start, "stop_time": stop, "step": step, "steps": {second: 2 * step}},
     )
@@ -322,11 +322,11 @@ def test_numbers_texts_and_names_are_read_as_they_were(
         [path] = write_ssp(system, Path(folder))
         again = read_ssp(path, findings=Findings(strict=True))
     assert list(again.components) == names
-    for one, other in zip(again.connections, system.connections, strict=True):
-        assert (one.source, one.target) == (other.source, other.target)
+    for wire, twin in zip(again.connections, system.connections, strict=True):
+        assert (wire.source, wire.target) == (twin.source, twin.target)
         # Files have no empty mappings, which change nothing.
-        how = Linear() if other.transformation == Mapped(()) else other.transformation
-        assert repr(one.transformation) == repr(how)
+        how = Linear() if twin.transformation == Mapped(()) else twin.transformation
+        assert repr(wire.transformation) == repr(how)
     # All elements of an array are written.
     elements = {"names[2]": ["a", "b"], "M[1,2]": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]}
     expected = dict(values)
@@ -442,14 +442,16 @@ def round_trip(system: System, offered: bool = False) -> System:
 
 def check_same(again: System, system: System) -> None:
     assert list(again.components) == list(system.components)
-    digests = [{n: c.digest for n, c in one.components.items()} for one in (again, system)]
+    digests = [{n: c.digest for n, c in version.components.items()} for version in (again, system)]
     assert digests[0] == digests[1]
     # Each input has one connection, so that their order does not matter.
     assert len(again.connections) == len(system.connections)
     assert set(again.connections) == set(system.connections)
     assert again.parameters == system.parameters
     assert (again.steps, again.left_open) == (system.steps, system.left_open)
-    experiments = [(one.start_time, one.stop_time, one.step) for one in (again, system)]
+    experiments = [
+        (version.start_time, version.stop_time, version.step) for version in (again, system)
+    ]
     assert experiments[0] == experiments[1]
 
 
@@ -468,17 +470,17 @@ def structure(system: System, offered: bool = False) -> ElementTree.Element:
 def connectors(element: ElementTree.Element) -> list[tuple[str, str]]:
     """Return names and kinds of the connectors of a system."""
     found = element.findall("Connectors/Connector")
-    return [(one.get("name", ""), one.get("kind", "")) for one in found]
+    return [(connector.get("name", ""), connector.get("kind", "")) for connector in found]
 
 
 def lines(element: ElementTree.Element) -> set[tuple[str, str]]:
     """Return the connections in a system, ends with a colon between element and connector."""
     return {
         (
-            f"{one.get('startElement', '')}:{one.get('startConnector')}",
-            f"{one.get('endElement', '')}:{one.get('endConnector')}",
+            f"{connection.get('startElement', '')}:{connection.get('startConnector')}",
+            f"{connection.get('endElement', '')}:{connection.get('endConnector')}",
         )
-        for one in element.findall("Connections/Connection")
+        for connection in element.findall("Connections/Connection")
     }
 
 
@@ -496,7 +498,7 @@ def test_values_cross_borders_by_one_connector_for_each_output(parts: dict[str, 
     inner = b.find("Elements/System")
     assert inner is not None
     assert (a.get("name"), b.get("name"), inner.get("name")) == ("a", "b", "in")
-    assert [one.get("name") for one in a.findall("Elements/Component")] == ["p", "c"]
+    assert [element.get("name") for element in a.findall("Elements/Component")] == ["p", "c"]
     assert connectors(outer) == []
     assert set(connectors(a)) == {
         ("a_p_y_x", "output"), ("top_m", "input"), ("b_in_p_y_x", "input"),
@@ -514,7 +516,9 @@ def test_values_cross_borders_by_one_connector_for_each_output(parts: dict[str, 
         (":a_p_y_x", "p:u.x"), (":a_p_y_x", "in:a_p_y_x"), ("in:b_in_p_y_x", ":b_in_p_y_x"),
     }  # fmt: skip
     assert lines(inner) == {(":a_p_y_x", "p:u.x"), ("p:y.x", ":b_in_p_y_x")}
-    units = {one.get("unit") for one in outer.iterfind(".//System/Connectors/Connector/Real")}
+    units = {
+        element.get("unit") for element in outer.iterfind(".//System/Connectors/Connector/Real")
+    }
     assert units == {"m"}
     check_same(round_trip(system), system)
 
@@ -560,7 +564,7 @@ def test_a_name_that_begins_another_component_stays_one(parts: dict[str, Compone
         for target, source in zip(targets, targets[3:] + targets[:3], strict=True)
     }
     system = system_of(parts, kinds, wires)
-    found = [one.get("name") for one in structure(system).findall("Elements/*")]
+    found = [element.get("name") for element in structure(system).findall("Elements/*")]
     assert found == ["a", "a.b", "a.b.c", "x", ".z", "w.", "v"]
     check_same(round_trip(system), system)
 
@@ -573,7 +577,10 @@ def test_arrays_cross_borders_as_a_whole(parts: dict[str, Component]):
     assert lines(outer) == {
         ("a:a_p_y", "b:a_p_y"), ("a:a_p_y", "c:a_p_y"), ("a:a_p_z", "c:a_p_z"),
     }  # fmt: skip
-    sizes = [one.get("size") for one in outer.iterfind(".//System/Connectors/Connector/Dimension")]
+    sizes = [
+        element.get("size")
+        for element in outer.iterfind(".//System/Connectors/Connector/Dimension")
+    ]
     assert sizes == ["3"] * 3
     check_same(round_trip(system), system)
 
@@ -696,12 +703,12 @@ def nested_systems(draw: st.DrawFn, parts: dict[str, Component]) -> System:
         "2": [("u.x", "Real", "m"), ("v", "Real", "km"), ("n", "Integer", "")],
         "3": [(f"u[{i}]", "Real", "") for i in (1, 2, 3)] + [("x", "Real", "")],
     }
-    sources = [(f"{name}:{port}", *of) for name in names for port, *of in outputs[kinds[name]]]
+    sources = [(f"{name}:{port}", *rest) for name in names for port, *rest in outputs[kinds[name]]]
     wires: dict[str, str] = {}
     made: dict[str, (Linear | Mapped)] = {}
     for name in names:
         for port, kind, unit in inputs[kinds[name]]:
-            fitting = [one for one in sources if one[1] == kind]
+            fitting = [source for source in sources if source[1] == kind]
             source = draw(st.none() | st.sampled_from(fitting)) if fitting else None
             if source is None:
                 continue
@@ -725,5 +732,7 @@ def test_random_systems_are_read_as_they_were(
     assume(not list(system.problems()))
     check_same(round_trip(system, offered), system)
     outer = structure(system, offered)
-    names = [name for one in (outer, *outer.iterfind(".//System")) for name, _ in connectors(one)]
+    names = [
+        name for element in (outer, *outer.iterfind(".//System")) for name, _ in connectors(element)
+    ]
     assert all(map(IDENT.fullmatch, names))
