@@ -480,7 +480,13 @@ def structure_xml(
         sources: path of each component's FMU in the archive; None: each FMU once.
         connectors: as of :func:`ssp_bytes`.
 
+    Raises:
+        InputError: a name of a component contains a slash, which :func:`.read_ssp` refuses.
+
     """
+    for name in system.components:
+        if set("/\\") & set(name):
+            raise InputError(f"component {name!r}: names in an SSP have no slashes")
     version = max(map(_version, system.components.values()))
     root = Element(_tag("ssd:SystemStructureDescription"), name=system.name, version=version)
     offered = list(offers(system)) if connectors else []

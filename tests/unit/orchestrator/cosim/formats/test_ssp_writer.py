@@ -269,8 +269,8 @@ _PLAIN = st.characters(codec="utf-8", exclude_categories=["Cc"], exclude_charact
 LEGAL = st.text(_PLAIN | st.sampled_from("\t\n\r<>&\"' \x85\u2028"), max_size=8)
 ILLEGAL = st.sampled_from("\x01\x08\x0b\x0c\x0e\x1f\ufffe\uffff")
 
-#: Names of components; a dot would nest them.
-LEGAL_NAMES = LEGAL.filter(lambda text: text.strip() and "." not in text)
+#: Names of components; a dot would nest them, and slashes are refused.
+LEGAL_NAMES = LEGAL.filter(lambda text: text.strip() and not set("./\\") & set(text))
 
 NUMBERS = st.floats(allow_nan=False, allow_infinity=False) | st.sampled_from([-0.0, 2.0**63])
 WIDE = st.integers(0, 2**64 - 1) | st.sampled_from([2**53 + 1, 2**63, 2**64 - 1])
@@ -354,6 +354,13 @@ def test_what_xml_cannot_hold_is_refused_by_name(every_type: Path, before, chara
         write_ssp(system, Path(folder))
     assert repr(character) in str(error.value)
     assert where == "name" or str(error.value).startswith(f"lag.{where.partition('[')[0]}: ")
+
+
+@pytest.mark.parametrize("name", ["a/b", "a\\b"])
+def test_a_name_with_a_slash_is_refused(every_type: Path, tmp_path: Path, name: str):
+    with pytest.raises(InputError) as error:
+        write_ssp(small_fmus.connected("a", {name: every_type}), tmp_path)
+    assert repr(name) in str(error.value)
 
 
 @pytest.mark.parametrize("start", ["INF", "-1e999", "NaN"])
