@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -350,12 +350,19 @@ def findings(seed: int) -> list[str]:
         for name, text in files.items():
             (folder / name).write_text(text, encoding="utf-8")
         (folder / "checked").mkdir()
+        # Other tests import modules of these names.
+        _forget(files)
         try:
             return [*filter(None, [_finding(folder / f"random_{seed}.py", folder, seed)])]
         finally:
             sys.path.remove(str(folder.resolve()))
-            for name in files:
-                sys.modules.pop(name.removesuffix(".py"), None)
+            _forget(files)
+
+
+def _forget(files: Iterable[str]) -> None:
+    """Remove the modules of some files from the process."""
+    for name in files:
+        sys.modules.pop(name.removesuffix(".py"), None)
 
 
 def _finding(script: Path, folder: Path, seed: int) -> str:
