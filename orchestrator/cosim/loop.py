@@ -34,7 +34,7 @@ from orchestrator.machine.compilers import (
 from orchestrator.machine.errors import InputError, reason
 
 #: Steps in Python that take as long as setting up the compiled loop, and as long as compiling it.
-_SET_UP, _COMPILED = 20, 10_000
+_SET_UP, _WORTH_COMPILING = 20, 10_000
 
 #: Above this number of values numpy's library splits products among threads, which takes
 #: milliseconds where other cores are busy.
@@ -263,6 +263,9 @@ def key_of(machine: str = platform_tuple) -> str:
     return library_key(SOURCE.read_text(encoding="utf-8"), *FLAGS, machine=machine)
 
 
+#: Name of the loop in C.
+COMPILED = "compiled"
+
 #: The loop that is always available.
 PYTHON_LOOP = Stepping("python", step_interpreted)
 
@@ -281,7 +284,7 @@ def choose_loop(
         InputError: the compiled loop is not available.
 
     """
-    if choice == "compiled":
+    if choice == COMPILED:
         if isolation:
             raise InputError(
                 "the compiled loop cannot step isolated FMUs: drop --loop compiled or --isolate"
@@ -290,11 +293,11 @@ def choose_loop(
     if choice == "auto" and not isolation and experiment.rows > _SET_UP:
         if library := load_stepper():
             return _compiled(library)
-        if experiment.rows > _COMPILED:
+        if experiment.rows > _WORTH_COMPILING:
             with suppress(InputError):
                 return _compiled(compile_stepper(in_no_time=True))
     return PYTHON_LOOP
 
 
 def _compiled(library: CDLL) -> Stepping:
-    return Stepping("compiled", partial(step_compiled, library))
+    return Stepping(COMPILED, partial(step_compiled, library))

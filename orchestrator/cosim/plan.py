@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, get_args
 
 from orchestrator.cosim.experiment import FEEDTHROUGH, LINEAR, Experiment
 from orchestrator.cosim.fmi.isolated import Isolation
-from orchestrator.cosim.loop import choose_loop
+from orchestrator.cosim.loop import COMPILED, choose_loop
 from orchestrator.cosim.stages import Arrangement, Stage, Stages, arrange, stages_of
 from orchestrator.cosim.system import System
 from orchestrator.machine.errors import InputError
@@ -131,18 +131,18 @@ def make_plan(
     rigid = [name for name, component in system.components.items() if not component.takes_any_step]
     period = lcm(*(every[name] for name in rigid))
     whole = experiment.full_steps // period * period
-    if not rigid or whole == experiment.rows - 1:
+    if rigid and whole != experiment.rows - 1:
+        why = f"{', '.join(rigid)}: takes only steps of a fixed length, so"
+        if whole == 0:
+            shortest = period * experiment.step
+            raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
+        end = experiment.time(whole)
+        remarks += (f"{why} the run ends with the last whole step, at t = {end:.12g} s",)
+        experiment = replace(experiment, stop_time=end)
+    if loop == COMPILED:
+        # Only this choice may not be available.
         choose_loop(loop, experiment, isolation)
-        return Plan(system, experiment, every, closed, arrangement, remarks, isolation, loop)
-    why = f"{', '.join(rigid)}: takes only steps of a fixed length, so"
-    if whole == 0:
-        shortest = period * experiment.step
-        raise InputError(f"{why} the run must last at least one step, {shortest:g} s")
-    end = experiment.time(whole)
-    remark = f"{why} the run ends with the last whole step, at t = {end:.12g} s"
-    shorter = replace(experiment, stop_time=end)
-    choose_loop(loop, shorter, isolation)
-    return Plan(system, shorter, every, closed, arrangement, (*remarks, remark), isolation, loop)
+    return Plan(system, experiment, every, closed, arrangement, remarks, isolation, loop)
 
 
 def _check_linear(system: System) -> None:
