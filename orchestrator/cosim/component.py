@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from orchestrator.cosim.variables import (
     terminals_of,
     variables_of,
 )
+from orchestrator.machine.disk import has_slash
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, reason, shortened
 from orchestrator.machine.texts import finite, integer, real
 from orchestrator.machine.user_files import unpack, unpacked_folder
@@ -126,7 +126,7 @@ def described(fmu: Path, folder: Path) -> Described:
     if read.description.guid is None:
         raise InputError(f"{fmu}: not a readable FMU: its description has no guid")
     identifier = implementation.modelIdentifier
-    if not re.fullmatch(r"[^/\\]+", identifier or ""):
+    if not identifier or has_slash(identifier):
         raise InputError(f"{fmu}: its model identifier {identifier!r} names no library")
     if read.flaw is not None:
         variables = read.description.modelVariables

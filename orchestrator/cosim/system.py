@@ -249,8 +249,7 @@ class System:
             if ports:
                 members = listed([str(port) for port in ports])
                 raise InputError(f"{name}: takes a list of {len(ports)} values, for {members}")
-            variable = self.component(target.component).variable(target.port)
-            new[target] = variable.typed(value, str(target))
+            new[target] = self.variable(target).typed(value, str(target))
         return replace(self, parameters={**self.parameters, **new})
 
     def expanded(self, values: Values) -> dict[PortName, object]:
@@ -432,6 +431,15 @@ class System:
                 f"{did_you_mean(name, self.components)}"
             )
         return self.components[name]
+
+    def variable(self, port: PortName) -> Variable:
+        """Return the variable of a port.
+
+        Raises:
+            InputError: there is no such component or port.
+
+        """
+        return self.component(port.component).variable(port.port)
 
     def check(self) -> None:
         """Check connections and parameters against the descriptions of the FMUs.

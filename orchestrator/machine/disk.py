@@ -86,6 +86,11 @@ def sha256_of(path: Path) -> str:
 # Files
 
 
+def has_slash(name: str) -> bool:
+    """Return True if a name, as a part of a path, would lead into another folder."""
+    return "/" in name or "\\" in name
+
+
 def file_name(name: str, taken: Collection[str] = ()) -> str:
     """Return a file name that every system accepts, and that no other name is turned into.
 

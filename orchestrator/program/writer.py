@@ -574,8 +574,7 @@ class Text:
         """Return the value of a parameter or an unconnected input at the start."""
         value, port = self.plan.system.value(name), self.ports[name]
         if isinstance(value, str):
-            variable = self.plan.system.components[name.component].variable(name.port)
-            value = int(variable.items[value])
+            value = int(self.plan.system.variable(name).items[value])
         if value is None:
             value = port.start or 0
         types: dict[str, type[float | int | bool]] = {"Real": float, "Boolean": bool}

@@ -305,14 +305,10 @@ def read_inputs(
     columns = inputs.names
     with _in_file(inputs.file):
         targets = [system.named(PortName.read(name)) for name in columns]
-        variables = [_variable(system, target) for target in targets]
+        variables = [system.variable(target) for target in targets]
     times, *values = inputs.columns(variables)
     with _in_file(inputs.file):
         return with_input_table(system, targets, times, values, given, inputs.between)
-
-
-def _variable(system: System, port: PortName) -> Variable:
-    return system.component(port.component).variable(port.port)
 
 
 @contextmanager
@@ -344,7 +340,7 @@ def with_input_table(
 
     """
     targets = tuple(map(system.named, names))
-    variables = [_variable(system, target) for target in targets]
+    variables = [system.variable(target) for target in targets]
     _check_rows(times, columns, targets)
     fed = {connection.target: connection.source for connection in system.connections}
     for target, variable, column in zip(targets, variables, columns, strict=True):
@@ -561,7 +557,7 @@ def _ports(
     port = system.named(several[0])
     if not system.has(port) and not single and (members := system.members(text, causalities)):
         return members
-    variable = _variable(system, port)
+    variable = system.variable(port)
     if variable.causality not in causalities:
         raise InputError(
             f"{port} has causality {variable.causality}, not {' or '.join(causalities)}"
@@ -573,7 +569,7 @@ def _ports(
 
 def _routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Mapped) | None]]:
     """Return the inputs that a port feeds, each with its transformation; an input feeds itself."""
-    if _variable(system, port).causality == "input":
+    if system.variable(port).causality == "input":
         return [(port, None)]
     routes = [(c.target, c.transformation) for c in system.connections if c.source == port]
     if not routes:
@@ -620,7 +616,7 @@ def _altered(
 
 def _value(system: System, port: PortName, value: Any, change: (Linear | Mapped) | None) -> Value:
     """Convert the value of an overridden signal to the value of an input."""
-    variable = _variable(system, port)
+    variable = system.variable(port)
     taken = variable.typed(_text(value), str(port))
     if change is None:
         return taken
@@ -630,7 +626,7 @@ def _value(system: System, port: PortName, value: Any, change: (Linear | Mapped)
 
 def _offset(system: System, port: PortName, value: Any, change: (Linear | Mapped) | None) -> float:
     """Convert the bias of a signal to the bias of an input."""
-    added = system.component(port.component).variable(port.port).difference(value, str(port))
+    added = system.variable(port).difference(value, str(port))
     if isinstance(change, Mapped):
         raise InputError(f"{port} is mapped by its connection: nothing can be added to it")
     return change.factor * added if isinstance(change, Linear) else added
@@ -645,7 +641,7 @@ def _set(values: Mapping[str, Any], system: System) -> _Action:
     parameters, inputs = [], []
     for name, value in flatten(values):
         for port, each in _members(name, value, _ports(system, name, ("parameter", "input"))):
-            variable = _variable(system, port)
+            variable = system.variable(port)
             if port in fed:
                 raise InputError(f"{port} is fed by {fed[port]}: override it")
             if variable.causality == "input":

@@ -252,8 +252,7 @@ class _Names:
 
 
 def _variable(system: System, name: PortName) -> Variable:
-    target = system.named(name)
-    return system.component(target.component).variable(target.port)
+    return system.variable(system.named(name))
 
 
 def between(limits: Range, share: float, whole: bool) -> float | int:

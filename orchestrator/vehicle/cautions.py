@@ -247,7 +247,6 @@ def velocities_reaching(system: System, loop: Loop = STANDARD) -> list[str]:
         {
             str(source)
             for source in sources
-            if source.component in vehicles
-            and system.component(source.component).variable(source.port).unit in _VELOCITY_UNITS
+            if source.component in vehicles and system.variable(source).unit in _VELOCITY_UNITS
         }
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
@@ -29,6 +28,7 @@ from orchestrator.cosim.connection import (
 from orchestrator.cosim.formats.archive import LEFT_OPEN, ORDER, Archive
 from orchestrator.cosim.system import System
 from orchestrator.cosim.variables import MOST_ELEMENTS, Value, element_names, family_of
+from orchestrator.machine.disk import has_slash
 from orchestrator.machine.errors import Findings, InputError, did_you_mean, listed, shortened
 from orchestrator.machine.texts import BOOLEANS, finite, integer, real, whole
 
@@ -285,7 +285,7 @@ class Builder:
         members: dict[str, _AnyElement] = {}
         for element in content.findall("Elements/*"):
             name = element.get("name", "")
-            if not re.fullmatch(r"[^/\\]+", name):
+            if not name or has_slash(name):
                 self._archive.problem(f"component {name!r}: write it without slashes")
             elif name in members:
                 self._archive.problem(f"two components are named {'.'.join((*way, name))}")
@@ -645,12 +645,7 @@ class Bindings:
                     self._archive.problem(error)
         return given
 
-    def _apply(
-        self,
-        binding: Element,
-        element: _AnyElement,
-        given: Values,
-    ) -> None:
+    def _apply(self, binding: Element, element: _AnyElement, given: Values) -> None:
         where = ".".join(element.way) or "the system"
         values = self._content(binding, element, where, "ParameterValues/ParameterSet", _VALUES)
         if values is None:
@@ -682,12 +677,7 @@ class Bindings:
             )
 
     def _content(
-        self,
-        element: Element,
-        owner: _AnyElement,
-        where: str,
-        inline: str,
-        media_type: str,
+        self, element: Element, owner: _AnyElement, where: str, inline: str, media_type: str
     ) -> Element | None:
         """Return the content of an element, or of the file that it names."""
         stated = element.get("type", media_type)
@@ -759,9 +749,7 @@ def _texts(value: Element, is_array: bool) -> list[str]:
     return [text for element in several or [value] if (text := element.get("value")) is not None]
 
 
-def _inside_out(
-    group: SystemElement,
-) -> Iterator[_AnyElement]:
+def _inside_out(group: SystemElement) -> Iterator[_AnyElement]:
     """Yield all elements of a system, each system after its elements."""
     for element in group.members.values():
         if isinstance(element, SystemElement):

@@ -34,7 +34,7 @@ from orchestrator.cosim.formats.archive import LEFT_OPEN, OMS, ORDER, OSP, SSC, 
 from orchestrator.cosim.formats.ssp_reader import SystemPath
 from orchestrator.cosim.system import System
 from orchestrator.cosim.variables import Value, Variable
-from orchestrator.machine.disk import file_name, plain_file_names
+from orchestrator.machine.disk import file_name, has_slash, plain_file_names
 from orchestrator.machine.errors import InputError, shortened
 from orchestrator.machine.texts import literal
 from orchestrator.machine.user_files import read_archive
@@ -201,7 +201,7 @@ def _route(
     shared = _shared(places[source.component][0], inwards)
     start = _out(top, places[source.component], Crossing("output", component, variable), shared)
     start = _in(top, inwards, start, Crossing("input", component, variable), shared)
-    end = End(last, system.component(target.component).variable(target.port).array)
+    end = End(last, system.variable(target).array)
     if not is_whole:
         start = start._replace(indices=_indices(system, source))
         end = end._replace(indices=_indices(system, target))
@@ -259,7 +259,7 @@ def _nests(top: Nest, way: SystemPath) -> list[Nest]:
 
 def _indices(system: System, port: PortName) -> str | None:
     """Return the indices of an element of an array, as in SSP 2.0; None: it is a scalar."""
-    variable = system.component(port.component).variable(port.port)
+    variable = system.variable(port)
     if not variable.shape:
         return None
     return port.port.removeprefix(variable.array)[1:-1].replace(",", " ")
@@ -485,7 +485,7 @@ def structure_xml(
 
     """
     for name in system.components:
-        if set("/\\") & set(name):
+        if has_slash(name):
             raise InputError(f"component {name!r}: names in an SSP have no slashes")
     version = max(map(_version, system.components.values()))
     root = Element(_tag("ssd:SystemStructureDescription"), name=system.name, version=version)
@@ -600,7 +600,7 @@ def _add_line(connections: Element, line: Line, system: System) -> None:
         numbers = {"factor": str(made.factor), "offset": str(made.offset)}
         _add(element, "ssc:LinearTransformation", **numbers)
     elif isinstance(made, Mapped) and made.pairs:
-        fmi_type = system.component(source.component).variable(source.port).family
+        fmi_type = system.variable(source).family
         convert = bool if fmi_type == "Boolean" else int
         # Items of an enumeration are also integers.
         name = "BooleanMapping" if convert is bool else "IntegerMapping"
