@@ -177,19 +177,18 @@ def python_blocks(text: str) -> Iterator[Block]:
 
 def comment_blocks(text: str) -> Iterator[Block]:
     """Yield the comments of a module, those on lines that follow each other as one."""
-    line, words = 0, ""
+    comments: list[tuple[int, list[str]]] = []
     for token in tokenize.generate_tokens(StringIO(text).readline):
         if token.type == tokenize.COMMENT:
-            written = token.string.lstrip("#: ")
-            follows = words and token.start[0] == line + 1 + words.count("\n")
-            if follows and token.line.lstrip().startswith("#"):
-                words += f"\n{written}"
-                continue
-            if words and not _ORDER.match(words):
-                yield Block(line, without_code(words), False, is_inside=True)
-            line, words = token.start[0], written
-    if words and not _ORDER.match(words):
-        yield Block(line, without_code(words), False, is_inside=True)
+            line, words = token.start[0], token.string.lstrip("#: ")
+            is_whole_line = token.line.lstrip().startswith("#")
+            if comments and is_whole_line and line == comments[-1][0] + len(comments[-1][1]):
+                comments[-1][1].append(words)
+            else:
+                comments.append((line, [words]))
+    for line, lines in comments:
+        if not _ORDER.match(lines[0]):
+            yield Block(line, without_code("\n".join(lines)), False, is_inside=True)
 
 
 def c_blocks(text: str) -> Iterator[Block]:

@@ -234,13 +234,12 @@ def _export(options: argparse.Namespace) -> int:
                 "leave as they are in the FMU"
             )
     folder = options.out or Path("exports", prepared.scenario.stem)
+    title = prepared.scenario.title or system.name
     with replace_files(folder, force=options.force) as staging:
         if options.format == FMU:
-            title = prepared.scenario.title or system.name
             model = SystemModel(prepared.plan, system.name, title)
             written = write_fmu(model, staging, options.fmi, options.platforms, say)
         elif options.format == C:
-            title = prepared.scenario.title or system.name
             program = ProgramFiles(prepared.plan, prepared.scenario.stem, title, options.single)
             written = write_files(program, staging)
         elif options.format == OSP:
