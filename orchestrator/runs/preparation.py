@@ -44,7 +44,7 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import Identity
 from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.request import Request, SimulateOptions
+from orchestrator.runs.request import Request, SystemOptions
 from orchestrator.runs.scenario import (
     Inputs,
     Scenario,
@@ -67,6 +67,9 @@ DEFAULT_STEP = STEP
 
 #: Stop time of a system without one, if it is only checked or exported [s].
 FALLBACK_STOP_TIME = 1.0
+
+#: The caller of a function of the Python interface, seen from where it is warned.
+_STACK_LEVEL = 5
 
 # Loading
 
@@ -313,9 +316,22 @@ class Prepared:
             InputError: an FMU or a parameter is not usable; nothing was stepped.
 
         """
-        own: list[Hook] = [] if self.input_table is None else [self.input_table.playback()]
-        own += [Events(self.events)] if self.events else []
-        return simulate_plan(self.plan, observers, [*hooks, *own])
+        return simulate_plan(self.plan, observers, [*hooks, *self.hooks()])
+
+    def hooks(self) -> list[Hook]:
+        """Return hooks for its table of inputs and its events."""
+        hooks: list[Hook] = [] if self.input_table is None else [self.input_table.playback()]
+        return hooks + ([Events(self.events)] if self.events else [])
+
+    def with_parameters(self, values: Mapping[str, object]) -> Prepared:
+        """Return the run with further values of parameters.
+
+        Raises:
+            InputError: a name or a value is not usable.
+
+        """
+        system = self.system.with_parameters(values)
+        return replace(self, plan=replace(self.plan, system=system))
 
     def doubts(self) -> list[str]:
         """Warn of possible omissions: inputs without a source, parameters of a vehicle."""
@@ -332,6 +348,33 @@ class Prepared:
         return [event for i, event in enumerate(self.events) if i not in happened]
 
 
+def prepare_options(options: SystemOptions) -> Prepared:
+    """Load and prepare the system of a call in Python; flaws and doubts are Python's warnings.
+
+    Raises:
+        InputError: there is no such system, or the request cannot be met.
+
+    """
+    system, findings = options.system, Findings(options.strict)
+    if isinstance(system, System):
+        check_brings_its_own(str(system), options.kind)
+        if options.variant is not None:
+            raise InputError(f"{system}: has no variants; give it to load")
+        scenario = Scenario(system.name)
+    else:
+        scenario, system = load_scenario(
+            system, options.kind, variant=options.variant, findings=findings
+        )
+        findings.refuse()
+    if not isinstance(options.parameters, Mapping | None):
+        raise InputError(
+            f"parameters: a mapping by component.parameter, not {options.parameters!r}"
+        )
+    prepared = prepare(scenario, system, options)
+    warn_of(findings, [] if options.system is system else prepared.doubts(), _STACK_LEVEL)
+    return prepared
+
+
 def prepare_request(request: Request) -> Prepared:
     """Load and prepare the scenario of a request.
 
@@ -342,7 +385,7 @@ def prepare_request(request: Request) -> Prepared:
     return prepare(*load_scenario(request.scenario, request.kind), request)
 
 
-def prepare(scenario: Scenario, system: System, request: Request | SimulateOptions) -> Prepared:
+def prepare(scenario: Scenario, system: System, request: Request | SystemOptions) -> Prepared:
     """Apply a request to a scenario and its system.
 
     Raises:
@@ -377,7 +420,9 @@ def prepare(scenario: Scenario, system: System, request: Request | SimulateOptio
         coupling = "solve"
     experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
     isolation = Isolation.of(request.isolate, request.step_timeout)
-    plan = make_plan(system, experiment, isolation, request.loop)
+    # A program is not a loop of FMUs.
+    loop = request.loop if request.loop in Plan.LOOPS else Plan.LOOPS[0]
+    plan = make_plan(system, experiment, isolation, loop)
     with findings.collecting():
         followed = input_table.targets if input_table else ()
         events = read_events(scenario.name, scenario.events, replace(system, step=step), followed)

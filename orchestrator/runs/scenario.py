@@ -567,7 +567,7 @@ def _ports(
     return [port]
 
 
-def _routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Mapped) | None]]:
+def routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Mapped) | None]]:
     """Return the inputs that a port feeds, each with its transformation; an input feeds itself."""
     if system.variable(port).causality == "input":
         return [(port, None)]
@@ -583,7 +583,7 @@ def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
         target
         for name in _targets(names)
         for port in _ports(system, name, ("input", "output"))
-        for target, _ in _routes(system, port)
+        for target, _ in routes(system, port)
     )
 
 
@@ -604,7 +604,7 @@ def _altered(
     altered = []
     for name, value in flatten(values):
         for port, each in _members(name, value, _ports(system, name, ("input", "output"))):
-            for target, change in _routes(system, port):
+            for target, change in routes(system, port):
                 arrived = arriving(system, port, each, change)
                 if isinstance(arrived, float) and not isfinite(arrived):
                     raise InputError(

@@ -23,7 +23,7 @@ ROOT = Path(__file__).parents[2]
 FLOORS = {
     "auv_fmu": ("language", "paper", "proof", "remus", "water", "guidance", "loop"),
     "orchestrator": (
-        "machine", "cosim", "vehicle", "figures", "runs", "program", "live",
+        "machine", "cosim", "vehicle", "figures", "runs", "program", "simulation", "live",
         "exchange", "studies", "paper", "commands",
     ),
     "fmus": (
