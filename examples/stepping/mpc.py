@@ -17,7 +17,7 @@ QUIET, STOP = {"plant.noise.std": 0.0}, 60.0
 #: Moves that are planned, and the steps of 20 ms that each is held.
 MOVES, HOLD = 6, 25
 
-#: Limit of the commands [N, N.m], and their weights and those of their changes against a metre.
+#: Limit of the commands [N, N.m], and weights of commands and of their changes against a metre.
 LIMIT, WEIGHT, CHANGE = 80.0, 0.01, 0.03
 
 

@@ -15,7 +15,7 @@ from auv_fmu import Simulation, Simulations
 STEPS, NOISE = 5, np.array([0.01] * 3 + [0.002] * 3)
 
 #: The state is eta, nu, tau_w, m11 [kg] and d11 [kg/s]: the guess of all but eta, the standard
-#: deviations of the guess, and those of the changes in a second.
+#: deviations of the guess, and of the changes in a second.
 GUESS = [0.0] * 12 + [20.0, 25.0]
 DEVIATION = np.array([0.01] * 3 + [0.002] * 3 + [0.1] * 6 + [1.0] * 6 + [4.0, 5.0])
 DRIFT = np.array([1e-4] * 6 + [1e-3] * 6 + [1.0] * 6 + [0.0, 0.0])
@@ -48,7 +48,7 @@ def predict(plants, mean, covariance, taus):
 
 
 def estimate(times, parameters=None, seed=1):
-    """Yield the time, the estimated m11 and its deviation, and those of d11, at some times."""
+    """Yield the time, m11 and its deviation, and d11 and its deviation, at some times."""
     noise = np.random.default_rng(seed)
     auv = Simulation("fig4", parameters, keep=False)
     mean, covariance = np.concatenate((auv["plant.eta"], GUESS)), np.diag(DEVIATION**2)
