@@ -7,7 +7,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, Literal, NamedTuple, TypeAlias, cast
+from typing import Any, Literal, NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
 
@@ -127,6 +127,38 @@ class _Settable(NamedTuple):
         return self.variable.typed(value, str(self.port))
 
 
+#: Causalities of what has a value here.
+_VALUED = ("output", "input", "parameter")
+
+
+def ports_of(system: System, name: str, causalities: Sequence[str] = _VALUED) -> list[PortName]:
+    """Return the port of a name, or the members of a group.
+
+    Args:
+        system: with the ports.
+        name: of a port, a parameter or a group.
+        causalities: of groups; the first that a group has counts.
+
+    Raises:
+        InputError: there is none; the message has a suggestion.
+
+    """
+    if "." in name:
+        port = system.named(PortName.read(name))
+        if system.has(port) and system.variable(port).causality in _VALUED:
+            return [port]
+        for causality in causalities:
+            if members := system.members(name, (causality,)):
+                return members
+    known = [
+        f"{component.name}.{variable.name}"
+        for component in system.components.values()
+        for variable in component.variables.values()
+        if variable.causality in _VALUED
+    ]
+    raise InputError(f"no port or parameter {name!r}{did_you_mean(name, known)}")
+
+
 class State(NamedTuple):
     """A state of a simulation: see :meth:`Simulation.save`."""
 
@@ -172,6 +204,9 @@ class Simulation:
             ValueError: a name, a value or a file is not usable; the message says what to change.
 
         """
+        loops = get_args(Loop)
+        if options.loop not in loops:
+            raise InputError(f"loop {options.loop!r}: use one of {', '.join(loops)}")
         self._options = options
         self._start(prepare_options(options))
 
@@ -360,39 +395,25 @@ class Simulation:
         if name == "time":
             return lambda: self.time
         system, header = self._now.system, self._session.header
-        ports = self._ports(name, ("output", "input"))
-        if ports:
+        try:
+            ports = ports_of(system, name)
+        except InputError as error:
+            raise KeyError(str(error)) from None
+        is_group = not system.has(PortName.read(name))
+        if str(ports[0]) in self._places:
             places = [self._places[str(port)] for port in ports]
-            if len(ports) == 1 and str(ports[0]) == name:
-                if name not in header.types:
-                    return places[0]
-                return lambda: header.values(name, self._as_row())[0]
-            return np.array(places)
-        parameters = self._ports(name, ("parameter",))
-        if not parameters:
-            known = [*self._places, *map(str, header.parameters)]
-            raise KeyError(f"no port or parameter {name!r}{did_you_mean(name, known)}")
-        if str(parameters[0]) == name:
-            [port] = parameters
-            variable = system.variable(port)
-            return lambda: variable.shown(self._session.parameter(port))
-        return lambda: np.array([self._session.parameter(port) for port in parameters])
+            if is_group:
+                return np.array(places)
+            if str(ports[0]) in header.types:
+                return lambda: header.values(str(ports[0]), self._as_row())[0]
+            return places[0]
+        if is_group:
+            return lambda: np.array([self._session.parameter(port) for port in ports])
+        variable = system.variable(ports[0])
+        return lambda: variable.shown(self._session.parameter(ports[0]))
 
     def _as_row(self) -> np.ndarray:
         return np.concatenate(([self.time], self._values()))[np.newaxis]
-
-    def _ports(self, name: str, causalities: Sequence[str]) -> list[PortName]:
-        """Return the port of a name, or the members of a group; empty: there is none."""
-        system = self._now.system
-        if "." not in name:
-            return []
-        port = system.named(PortName.read(name))
-        if system.has(port):
-            return [port] if system.variable(port).causality in causalities else []
-        for causality in causalities:
-            if members := system.members(name, (causality,)):
-                return members
-        return []
 
     def __setitem__(self, name: str, value: Any) -> None:
         """Override inputs, or set tunable parameters; of a group, with one value or one for each.
@@ -424,12 +445,13 @@ class Simulation:
 
         """
         session = self._open()
-        for settable in self._settable(name):
-            for target, _ in settable.targets:
-                if target not in self._held:
-                    raise InputError(f"{target} is not overridden")
-                session.release(target)
-                del self._held[target]
+        targets = [target for settable in self._settable(name) for target, _ in settable.targets]
+        for target in targets:
+            if target not in self._held:
+                raise InputError(f"{target} is not overridden")
+        for target in targets:
+            session.release(target)
+            del self._held[target]
 
     def _settable(self, name: str) -> list[_Settable]:
         """Return the ports of a name that can be set.
@@ -441,11 +463,7 @@ class Simulation:
         if name in self._settables:
             return self._settables[name]
         system = self._now.system
-        ports = self._ports(name, ("input", "output")) or self._ports(name, ("parameter",))
-        if not ports:
-            # Raises an error with a suggestion.
-            system.variable(system.named(PortName.read(name)))
-            raise InputError(f"{name} cannot be set")
+        ports = ports_of(system, name, ("input", "output", "parameter"))
         for port in ports:
             variable = system.variable(port)
             if variable.causality == "parameter" and variable.variability != "tunable":
@@ -556,7 +574,10 @@ class Simulation:
 
     def close(self) -> None:
         """Free the FMUs; nothing follows but :meth:`result`."""
-        self._closing()
+        if self._closing.alive:
+            # The last row needs FMUs to which values pass.
+            self._session.values()
+            self._closing()
 
     def __enter__(self) -> Simulation:
         return self

@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cosim import Order, PortName, System, Value, Variable
-from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.errors import InputError
 from orchestrator.program.session import Place, ProgramSession, stepped_program
 from orchestrator.runs.preparation import prepare_options
 from orchestrator.runs.request import SystemOptions
 from orchestrator.runs.scenario import routes
+from orchestrator.simulation.simulation import ports_of
 
 #: Least number of simulations for which a further thread is worth its start.
 _WORTH_A_THREAD = 128
@@ -181,7 +182,11 @@ class Simulations:
             self._is_stale = False
         if name in self._views:
             return self._views[name]
-        places = [self._place(port) for port in self._ports(name)]
+        try:
+            ports = ports_of(self._system, name)
+        except InputError as error:
+            raise KeyError(str(error)) from None
+        places = [self._place(port) for port in ports]
         view = self._view(places)
         if self._system.has(PortName.read(name)):
             view = view[:, 0]
@@ -189,18 +194,6 @@ class Simulations:
             view.flags.writeable = False
             self._views[name] = view
         return view
-
-    def _ports(self, name: str) -> list[PortName]:
-        system = self._system
-        if "." in name:
-            port = system.named(PortName.read(name))
-            if system.has(port):
-                return [port]
-            for causality in ("output", "input", "parameter"):
-                if members := system.members(name, (causality,)):
-                    return members
-        known = [*map(str, self._program.columns), *map(str, self._program.settables)]
-        raise KeyError(f"no port or parameter {name!r}{did_you_mean(name, known)}")
 
     def _place(self, port: PortName) -> Place:
         program = self._program
@@ -216,10 +209,7 @@ class Simulations:
             ValueError: there is no such input or parameter, or it does not take the values.
 
         """
-        try:
-            ports = self._ports(name)
-        except KeyError as error:
-            raise InputError(str(error.args[0])) from None
+        ports = ports_of(self._system, name, ("input", "output", "parameter"))
         columns = _columns(name, values, self.n, len(ports))
         for port, column in zip(ports, columns, strict=True):
             variable = self._system.variable(port)
@@ -263,7 +253,7 @@ class Simulations:
             ValueError: there is no such input.
 
         """
-        for port in self._ports(name):
+        for port in ports_of(self._system, name, ("input", "output")):
             for target, _ in routes(self._system, port):
                 for i in range(self.n):
                     memory = self._memory[i].ctypes.data
@@ -297,7 +287,7 @@ class Simulations:
             numbers = np.ascontiguousarray(np.atleast_1d(numbers[which]))
         values = self._values.copy() if parameters else self._values
         for name, given in (parameters or {}).items():
-            ports = self._ports(name)
+            ports = ports_of(self._system, name, ("parameter", "input"))
             columns = _columns(name, given, len(numbers), len(ports))
             for port, column in zip(ports, columns, strict=True):
                 if port not in self._program.settables:
