@@ -28,7 +28,6 @@ from orchestrator.machine.errors import InputError, StartError, reason, unforese
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.texts import literal
 
-
 #: Most steps that take so short a time that no signal need be held back.
 _FEW = 10
 
@@ -309,13 +308,22 @@ class Session:
         return self.run.experiment
 
     def regrid(self, experiment: Experiment) -> None:
-        """Go on with other steps: those of an experiment that begins now, or when this one did."""
+        """Continue with the steps of an experiment that begins now, or when the present one did."""
         run = self.run
         if experiment.start_time != run.experiment.start_time:
             run.blocks.restart(run.blocks.count - run.made)
             run.made = 0
         run.experiment = experiment
         self._steps = None
+
+    def take_interrupts(self) -> Sequence[int]:
+        """Return the signals that have stopped the last steps; more steps may then follow."""
+        numbers = self._interrupts.numbers
+        if numbers:
+            self._interrupts = Interrupts()
+            self._watch_interrupts()
+            self.failure = None
+        return numbers
 
     def values(self) -> np.ndarray:
         """Return the present values of all columns, as the next row will show them.

@@ -105,7 +105,7 @@ class SteppedProgram:
         return np.array([float(self._text.start(name, plan.system)) for name in self.settables])
 
     def number(self, name: PortName, value: Value) -> float:
-        """Return the number of a value of a port, such as that of an item of an Enumeration."""
+        """Return the number of a value of a port; an item of an Enumeration has one."""
         if isinstance(value, str):
             value = int(self.plan.system.variable(name).items[value])
         return float(value)
@@ -245,7 +245,7 @@ class ProgramSession:
         return self._made.value
 
     def regrid(self, experiment: Experiment) -> None:
-        """Go on with other steps: those of an experiment that begins now, or when this one did."""
+        """Continue with the steps of an experiment that begins now, or when the present one did."""
         if experiment.start_time != self.experiment.start_time:
             self._handed -= self._made.value
         self._library.regrid(
@@ -275,6 +275,10 @@ class ProgramSession:
     def _refused(self) -> None:
         time = self.experiment.time(self._made.value)
         self.failure = f"stopped at t = {time:.12g} s: {self._program.refusal(self._memory, time)}"
+
+    def take_interrupts(self) -> Sequence[int]:
+        """Return the signals that were held back: none."""
+        return ()
 
     def values(self) -> np.ndarray:
         """Return the present values of all columns, as the next row will show them."""

@@ -38,7 +38,7 @@ Loop = Literal["auto", "program", "compiled", "python"]
 
 
 class SimulationFailed(RuntimeError):
-    """A simulation that cannot go on; the text says when and why it stopped."""
+    """A simulation that cannot continue; the text says when and why it stopped."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +127,7 @@ class _Settable(NamedTuple):
         return self.variable.typed(value, str(self.port))
 
 
-#: Causalities of what has a value here.
+#: Causalities of ports with values.
 _VALUED = ("output", "input", "parameter")
 
 
@@ -183,13 +183,13 @@ class Simulation:
     until `del sim[name]`; an unconnected input keeps the value. A tunable parameter changes at
     once. In feedthrough order, a change shows at once in everything that depends on it.
 
-    It need not be used in a `with` statement, which frees FMUs at its end. Several simulations may
-    run in several threads, each in one at a time.
+    The end of a `with` statement, or :meth:`close`, frees FMUs. Several threads may step
+    simulations of their own.
 
     Attributes:
         loop: that makes the steps: `program`, `compiled` or `python`.
         step_size: length of a step [s].
-        stop_time: end of :meth:`run` [s].
+        stop_time: end of :meth:`run` [s]; None: there is none.
 
     """
 
@@ -208,16 +208,16 @@ class Simulation:
         if options.loop not in loops:
             raise InputError(f"loop {options.loop!r}: use one of {', '.join(loops)}")
         self._options = options
-        self._start(prepare_options(options))
+        self._start(prepare_options(options, is_open=True))
 
     def _start(self, prepared: Prepared) -> None:
         self._prepared = self._now = prepared
         self._rows = _Rows()
         self._session = self._opened()
         self.loop = cast(Loop, self._session.loop)
-        self.step_size, self.stop_time = prepared.experiment.step, prepared.experiment.stop_time
+        self.step_size, self.stop_time = prepared.experiment.step, prepared.stop_time
         components = prepared.system.components
-        #: Names of what acts at multiples of the step, or takes no others.
+        #: Events, tables and components that need whole steps of the same length.
         self._rigid = [
             *(["the scenario's events"] if prepared.events else []),
             *(["the table of inputs"] if prepared.input_table else []),
@@ -281,10 +281,10 @@ class Simulation:
         session = self._open()
         length = self.step_size if h is None else h
         if length != session.experiment.step:
-            self._check_free(f"a step of {length:g} s", length)
+            self._check_free(f"a step of {length:g} s")
             self._regrid(self.time, length)
         elif self._rigid and session.made >= session.experiment.full_steps:
-            self._check_free("a step after the stop time", length)
+            self._check_free("a step after the stop time")
         self._advance(session.made + 1)
 
     def run(self, until: float | None = None) -> None:
@@ -296,40 +296,45 @@ class Simulation:
         Raises:
             ValueError: the time has passed, or a component does not take such steps.
             SimulationFailed: a component fails, or has ended the run.
-            KeyboardInterrupt: Ctrl-C, after a whole step; the simulation can go on.
+            KeyboardInterrupt: Ctrl-C, after a whole step; the simulation can continue.
 
         """
         session = self._open()
         end, now = self.stop_time if until is None else until, self.time
+        if end is None:
+            raise InputError(f"{self._now.scenario.name}: has no stop time; use run(until=...)")
         if not end >= now:
             raise InputError(f"until = {end:g} s: the simulation has reached {now:g} s")
         if end == now:
             return
+        if session.experiment.step != self.step_size:
+            self._regrid(now, self.step_size)
         grid = replace(session.experiment, stop_time=end)
         if self._rigid:
-            whole = session.experiment.stop_time == grid.stop_time or (
-                not grid.has_short_step and grid.full_steps < session.experiment.rows
-            )
-            if not whole:
-                self._check_free(f"a run until {end:g} s", end)
+            is_end = end == session.experiment.stop_time
+            if not is_end and (
+                grid.has_short_step or grid.full_steps > session.experiment.full_steps
+            ):
+                self._check_free(f"a run until {end:g} s")
             self._advance(grid.rows - 1)
             return
         self._advance(grid.full_steps)
         if grid.has_short_step:
             session.regrid(grid)
             self._advance(grid.rows - 1)
-            self._regrid(end, session.experiment.step)
+            self._regrid(end, self.step_size)
 
-    def _check_free(self, what: str, length: float) -> None:
-        """Refuse what components, events and tables do not allow."""
+    def _check_free(self, what: str) -> None:
+        """Refuse steps that components, events or tables do not allow."""
         if self._rigid:
+            end = self._session.experiment.stop_time
             raise InputError(
                 f"{what}: {self._rigid[0]} allows whole steps of {self.step_size:g} s only, up to "
-                f"the stop time, {self.stop_time:g} s"
+                f"stop_time, {end:g} s"
             )
 
     def _regrid(self, start: float, step: float) -> None:
-        """Go on with steps of a length, without an end."""
+        """Continue with steps of a length, without an end."""
         experiment = self._session.experiment
         end = start + _MANY * step
         self._session.regrid(replace(experiment, start_time=start, step=step, stop_time=end))
@@ -347,15 +352,13 @@ class Simulation:
         self._check()
 
     def _check(self) -> None:
-        """Raise an exception if the session cannot go on."""
+        """Raise an exception if no step can follow."""
         session = self._session
         if (failure := session.failure or session.remark) is None:
             return
-        if numbers := session.ending.interrupts:
-            # Held back while the FMUs computed; now they act as usual.
-            session.failure = None
-            for number in numbers:
-                signal.raise_signal(number)
+        # Held back while the FMUs computed; now they act as usual.
+        for number in session.take_interrupts():
+            signal.raise_signal(number)
         raise SimulationFailed(failure)
 
     def _open(self) -> Session | ProgramSession:

@@ -44,7 +44,7 @@ class Simulations:
     Attributes:
         n: number of simulations.
         step_size: length of a step [s].
-        stop_time: end of :meth:`run` [s].
+        stop_time: end of :meth:`run` [s]; None: there is none.
 
     """
 
@@ -83,14 +83,14 @@ class Simulations:
         each = {name: value for name, value in parameters.items() if _has_rows(value, n)}
         same = {name: value for name, value in parameters.items() if name not in each}
         options = SystemOptions(system, same, stop_time=stop_time, step=step, order=order)
-        prepared = prepare_options(options)
+        prepared = prepare_options(options, is_open=True)
         if prepared.events or prepared.input_table:
             raise InputError(f"{prepared.scenario.name}: has events or a table of inputs")
         self._prepared, self._system = prepared, prepared.system
         program = self._program = stepped_program(prepared.plan, is_quick=True)
         self._library = program.library
         experiment = prepared.experiment
-        self.step_size, self.stop_time = experiment.step, experiment.stop_time
+        self.step_size, self.stop_time = experiment.step, prepared.stop_time
         self._start_time = experiment.start_time
         self._memory = np.zeros((n, program.size), dtype=np.uint8)
         self._threads = min(threads or os.cpu_count() or 1, max(n // _WORTH_A_THREAD, 1))
@@ -147,6 +147,10 @@ class Simulations:
 
         """
         end = self.stop_time if until is None else until
+        if end is None:
+            raise InputError(
+                f"{self._prepared.scenario.name}: has no stop time; use run(until=...)"
+            )
         steps = (end - self._start_time) / self.step_size
         whole = round(steps)
         if abs(steps - whole) > 1e-9 * max(whole, 1):
@@ -291,7 +295,7 @@ class Simulations:
             columns = _columns(name, given, len(numbers), len(ports))
             for port, column in zip(ports, columns, strict=True):
                 if port not in self._program.settables:
-                    raise InputError(f"{port} is no parameter")
+                    raise InputError(f"{port} is not a parameter")
                 number, _ = self._program.settables[port]
                 values[numbers, number] = _numbers(self._system.variable(port), column, port)
         self._library.begin_all(
@@ -364,5 +368,5 @@ def _numbers(variable: Variable, values: np.ndarray, port: PortName) -> np.ndarr
 
 
 def _number(variable: Variable, value: Value) -> float:
-    """Return the number of a value, such as that of an item of an Enumeration."""
+    """Return the number of a value; an item of an Enumeration has one."""
     return float(variable.items[value] if isinstance(value, str) else value)

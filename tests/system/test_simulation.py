@@ -174,7 +174,7 @@ def test_a_run_to_the_end_is_simulate(way: dict[str, Any], loop: str, order: str
         sim.run()
         result = sim.result()
         assert (sim.loop, sim.time) == (loop, 0.51)
-        # It goes on from there, on another grid.
+        # It continues from there, on another grid.
         sim.step()
         assert sim.time == pytest.approx(0.53, abs=1e-15)
         assert len(sim.result()) == len(result) + 1
@@ -182,7 +182,7 @@ def test_a_run_to_the_end_is_simulate(way: dict[str, Any], loop: str, order: str
     assert result.metrics() == simulate(fig4(way), **options).metrics()
 
 
-def test_steps_of_any_length_are_those_of_fmpy(native: Path):
+def test_fmpy_makes_the_same_steps_of_any_length(native: Path):
     """FMPy drives the same FMU with the same inputs."""
     lengths = [0.02, 0.013, 0.02, 0.5, 1e-3, 0.0077, 0.02, 0.02]
     values: dict[str, list[list[float]]] = {}
@@ -194,7 +194,11 @@ def test_steps_of_any_length_are_those_of_fmpy(native: Path):
                 sim.step(h)
                 values[loop].append(sim["AuvPlant.eta"].tolist())
             assert sim.time == pytest.approx(sum(lengths), abs=1e-15)
-            np.testing.assert_array_equal(sim.result()["AuvPlant.tau.u"][:-1], 10.0 + np.arange(8))
+            # It returns to its own step.
+            sim.run(until=1.0)
+            assert np.diff(sim.result().time)[-2] == pytest.approx(H, abs=1e-15)
+            commands = sim.result()["AuvPlant.tau.u"][: len(lengths)]
+            np.testing.assert_array_equal(commands, 10.0 + np.arange(len(lengths)))
     values["fmpy"] = [*fmpy_steps(native / "AuvPlant.fmu", lengths)]
     for loop, found in values.items():
         assert found == values["fmpy"], loop
@@ -225,7 +229,7 @@ def fmpy_steps(fmu: Path, lengths: Sequence[float]) -> Iterator[list[float]]:
 
 
 @EACH_WAY
-def test_a_failure_is_that_of_simulate_and_a_reset_mends_it(way: dict[str, Any], loop: str):
+def test_it_fails_as_simulate_does_and_a_reset_mends_it(way: dict[str, Any], loop: str):
     failing = simulate(fig4(way), {"plant.d11": 1e4}, step=H)
     with Simulation(fig4(way), {"plant.d11": 1e4}, step=H, **without_kind(way)) as sim:
         before = sim.save()
@@ -256,6 +260,11 @@ def test_events_and_tables_act_and_your_hand_wins(way: dict[str, Any], loop: str
         sim.run()
         same_rows(sim.result(), simulate(fig4(way), events=events, step=H, stop_time=0.6))
         sim.reset()
+        sim.run(until=0.14)
+        with sim.copy() as twin:
+            sim.reset()
+            twin.run()
+            same_rows(twin.result(), simulate(fig4(way), events=events, step=H, stop_time=0.6))
         sim["plant.tau.u"] = -1.0
         sim.run(until=0.2)
         assert sim["plant.tau.u"] == -1.0
@@ -318,7 +327,7 @@ def test_states_can_be_pickled_and_rows_left_out():
             other.result()
 
 
-def test_ctrl_c_stops_after_a_step_and_the_simulation_goes_on():
+def test_ctrl_c_stops_after_a_step_and_more_can_follow():
     for loop in ("program", "compiled"):
         with Simulation("fig4", kind="native", loop=loop, keep=False) as sim:
             timer = Timer(0.2, signal.raise_signal, [signal.SIGINT])
