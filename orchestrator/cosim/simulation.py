@@ -28,6 +28,9 @@ from orchestrator.machine.errors import InputError, StartError, reason, unforese
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.texts import literal
 
+#: Most steps that take so short a time that no signal need be held back.
+_FEW = 10
+
 
 def simulate_plan(
     plan: Plan,
@@ -119,22 +122,32 @@ class Session:
         self._present: np.ndarray | None = None
         self._surroundings: Surroundings | None = None
         self._interrupts = Interrupts()
+        self._is_calm = plan.isolation is None and all(
+            component.is_ours and not component.runs_python
+            for component in plan.system.components.values()
+        )
 
     @property
     def loop(self) -> str:
         """Name of the loop that makes the steps."""
         return self._stepping.name
 
-    @contextmanager
-    def calling(self) -> Iterator[None]:
-        """Enter a context in which FMUs may be called; it may be nested.
+    def calling(self, briefly: bool = False) -> AbstractContextManager[object]:
+        """Return a context in which FMUs may be called; it may be nested.
 
         Signals to stop are held back, and whatever FMUs change in this process is restored at the
         end.
+
+        Args:
+            briefly: if set, FMUs of this program in C are called without it: they change nothing.
+
         """
-        if self._surroundings is not None:
-            yield
-            return
+        if self._surroundings is not None or (briefly and self._is_calm):
+            return nullcontext()
+        return self._calling()
+
+    @contextmanager
+    def _calling(self) -> Iterator[None]:
         # Overflowing values are reported as the value of a port, not by numpy.
         with (
             np.errstate(all="ignore"),
@@ -238,7 +251,7 @@ class Session:
         run = self.run
         run.until = NEVER if until is None else until
         self._present = None
-        with self.calling():
+        with self.calling(briefly=run.until - run.made <= _FEW):
             try:
                 self.failure = self._advance(until is None)
             except NotKept as error:
@@ -262,6 +275,10 @@ class Session:
             failure = f"stopped at t = {run.time:.12g} s: {error}"
         except KeyboardInterrupt:
             failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
+            if self._surroundings is None:
+                # Perhaps within a step: no other may follow.
+                self.failure = failure
+                raise
         except Ended as end:
             with suppress(ComponentFailed):
                 run.show()
@@ -291,13 +308,22 @@ class Session:
         return self.run.experiment
 
     def regrid(self, experiment: Experiment) -> None:
-        """Go on with other steps: those of an experiment that begins now, or when this one did."""
+        """Continue with the steps of an experiment that begins now, or when the present one did."""
         run = self.run
         if experiment.start_time != run.experiment.start_time:
             run.blocks.restart(run.blocks.count - run.made)
             run.made = 0
         run.experiment = experiment
         self._steps = None
+
+    def take_interrupts(self) -> Sequence[int]:
+        """Return the signals that have stopped the last steps; more steps may then follow."""
+        numbers = self._interrupts.numbers
+        if numbers:
+            self._interrupts = Interrupts()
+            self._watch_interrupts()
+            self.failure = None
+        return numbers
 
     def values(self) -> np.ndarray:
         """Return the present values of all columns, as the next row will show them.
@@ -308,7 +334,7 @@ class Session:
             run = self.run
             self._present = run.row.shown.copy()
             try:
-                with self.calling(), run.ahead():
+                with self.calling(briefly=True), run.ahead():
                     self._present = run.row.shown.copy()
             except ComponentFailed as error:
                 self.failure = self.failure or f"stopped at t = {run.time:.12g} s: {error}"
@@ -334,12 +360,12 @@ class Session:
 
         """
         self._present = None
-        with self.calling(), _explained():
+        with self.calling(briefly=True), _explained():
             tune(self.run, target, value)
 
     def parameter(self, name: PortName) -> Value:
         """Return the value of a parameter, as its FMU holds it."""
-        with self.calling():
+        with self.calling(briefly=True):
             return self._instances[name.component].read([name.port])[name.port]
 
     def save(self) -> SessionState:
@@ -350,7 +376,7 @@ class Session:
 
         """
         run = self.run
-        with self.calling(), _explained():
+        with self.calling(briefly=True), _explained():
             states = {name: instance.state() for name, instance in self._instances.items()}
         return SessionState(
             run.experiment,
@@ -370,7 +396,7 @@ class Session:
 
         """
         run = self.run
-        with self.calling(), _explained():
+        with self.calling(briefly=True), _explained():
             for name, instance in self._instances.items():
                 instance.restore(state.states[name])
         for part, of_part in zip(stateful(run), deepcopy(state.lasting), strict=True):
@@ -421,8 +447,7 @@ class Session:
 
     def hand_over(self) -> None:
         """Give the observers all rows so far."""
-        with self.calling():
-            self.run.blocks.hand_over()
+        self.run.blocks.hand_over()
 
     @property
     def is_shown(self) -> bool:

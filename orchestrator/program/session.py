@@ -21,7 +21,7 @@ from orchestrator.cosim import Ending, Experiment, Header, Observer, Plan, PortN
 from orchestrator.machine.errors import InputError
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
-from orchestrator.program.writer import CALLS, INPUT, Text
+from orchestrator.program.writer import CALLS, INPUT, STEP, Text
 
 #: Name of the loop.
 PROGRAM = "program"
@@ -105,21 +105,24 @@ class SteppedProgram:
         return np.array([float(self._text.start(name, plan.system)) for name in self.settables])
 
     def number(self, name: PortName, value: Value) -> float:
-        """Return the number of a value of a port, such as that of an item of an Enumeration."""
+        """Return the number of a value of a port; an item of an Enumeration has one."""
         if isinstance(value, str):
             value = int(self.plan.system.variable(name).items[value])
         return float(value)
 
-    def refusal(self, memory: Any) -> tuple[str, str]:
-        """Return the component that has refused, and its reason."""
+    def refusal(self, memory: Any, time: float) -> str:
+        """Return the component that has refused at a time [s], and its reason."""
         numbers = (c_int * 4)()
         self.library.failure(memory, numbers)
         component = self.components[numbers[0]]
         why = self.library.reason(memory).decode(errors="replace")
-        if CALLS[numbers[1]] == INPUT:
+        call = CALLS[numbers[1]]
+        if call == INPUT:
             ports = [name.port for name in self.inputs if name.component == component]
             why = f"its input {ports[numbers[2]]} is out of range"
-        return component, why
+        if call == STEP:
+            why = f"step refused at t = {time:g} s: {why}"
+        return f"{component}: {why}"
 
 
 _ARGUMENTS: Mapping[str, Sequence[Any]] = {
@@ -228,7 +231,7 @@ class ProgramSession:
             self._memory, self._values.ctypes.data, experiment.start_time, experiment.step,
             experiment.stop_time, experiment.full_steps, experiment.rows - 1,
         ):  # fmt: skip
-            raise InputError(": ".join(self._program.refusal(self._memory)))
+            raise InputError(self._program.refusal(self._memory, experiment.start_time))
         for observer in self._observers:
             observer.begin(self.header)
         # The number of the first row in the block.
@@ -242,7 +245,7 @@ class ProgramSession:
         return self._made.value
 
     def regrid(self, experiment: Experiment) -> None:
-        """Go on with other steps: those of an experiment that begins now, or when this one did."""
+        """Continue with the steps of an experiment that begins now, or when the present one did."""
         if experiment.start_time != self.experiment.start_time:
             self._handed -= self._made.value
         self._library.regrid(
@@ -271,8 +274,11 @@ class ProgramSession:
 
     def _refused(self) -> None:
         time = self.experiment.time(self._made.value)
-        component, why = self._program.refusal(self._memory)
-        self.failure = f"stopped at t = {time:.12g} s: {component}: {why}"
+        self.failure = f"stopped at t = {time:.12g} s: {self._program.refusal(self._memory, time)}"
+
+    def take_interrupts(self) -> Sequence[int]:
+        """Return the signals that were held back: none."""
+        return ()
 
     def values(self) -> np.ndarray:
         """Return the present values of all columns, as the next row will show them."""
@@ -303,14 +309,15 @@ class ProgramSession:
         self._present = None
         number, _ = self._program.settables[target]
         if self._library.tune(self._memory, number, self._program.number(target, value)):
-            _, why = self._program.refusal(self._memory)
-            raise InputError(f"{target.component}: {why}")
+            time = self.experiment.time(self._made.value)
+            raise InputError(self._program.refusal(self._memory, time))
 
     def parameter(self, name: PortName) -> Value:
         """Return the value of a parameter."""
         _, (at, is_whole) = self._program.settables[name]
         number: float = (c_int if is_whole else c_double).from_buffer(self._memory, at).value
-        return number
+        is_boolean = self.plan.system.variable(name).family == "Boolean"
+        return bool(number) if is_boolean else number
 
     def save(self) -> ProgramState:
         """Return the present state."""

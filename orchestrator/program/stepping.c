@@ -7,7 +7,7 @@
 
 EXPORTED const char *reason(const simulation *it) { return REASON(it); }
 
-/* Goes on with other steps. Those made before do not count if the start is another one. */
+/* Continues with other steps. With another start, steps made before do not count. */
 EXPORTED void regrid(simulation *it, double start_time, double step, double stop_time,
                      int full_steps, int steps) {
     if (start_time != it->start_time) {
@@ -90,8 +90,7 @@ EXPORTED int tune_all(char *all, int n, int which, const double values[]) {
     return refusals;
 }
 
-/* Gives the places of columns and of parameters, and whether they are whole; those of factors,
- * offsets and supplied values of inputs; and those of other members. */
+/* Gives the places of columns and parameters, each with 1 for an int, and of other members. */
 EXPORTED void places(size_t columns_at[], size_t settables_at[], size_t members_at[]) {
     for (size_t i = 0; i < sizeof columns / sizeof columns[0]; i++) {
         columns_at[2 * i] = columns[i].place;

@@ -278,8 +278,8 @@ _KEPT = "Error *error = fresh(it);"
 
 _FRESH = """\
 static inline Error *fresh(simulation *it) {
-    it->error.raised = 0;
-    return &it->error;
+    it->noted.raised = 0;
+    return &it->noted;
 }"""
 
 
@@ -736,7 +736,7 @@ class Text:
             ]
         if self.is_stepped:
             rows += [
-                "Error error;",
+                "Error noted;",
                 "int is_passed; /* if set, values have passed since the last change */",
                 "int has_failed; /* if set, a component has refused */",
                 "int no_fault; /* 0 */",
@@ -1245,7 +1245,7 @@ class Text:
             return []
         error = "fresh(it)" if self.is_stepped else "&(Error){0}"
         passed = f"pass(it, k, t, {error})" if self.passes else "0"
-        reason = "it->error.why.text" if self.keeps_messages else '""'
+        reason = "it->noted.why.text" if self.keeps_messages else '""'
         defined = [
             f"enum {{ HAS_PASSING = {int(self.passes)} }};",
             f"#define PASS(it, k, t) {passed}",

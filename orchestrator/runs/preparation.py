@@ -71,6 +71,9 @@ FALLBACK_STOP_TIME = 1.0
 #: The caller of a function of the Python interface, seen from where it is warned.
 _STACK_LEVEL = 5
 
+#: Number of steps of a run without an end.
+_MANY = 500_000_000
+
 # Loading
 
 
@@ -280,6 +283,7 @@ class Prepared:
         plan: the system, and its steps.
         events: of the run.
         input_table: values of inputs over time; None: inputs keep their values.
+        is_open: if set, nothing says when the run ends.
 
     """
 
@@ -287,6 +291,7 @@ class Prepared:
     plan: Plan
     events: tuple[Event, ...] = ()
     input_table: InputTable | None = None
+    is_open: bool = False
 
     @property
     def system(self) -> System:
@@ -297,6 +302,11 @@ class Prepared:
     def experiment(self) -> Experiment:
         """Times, step and order of the run."""
         return self.plan.experiment
+
+    @property
+    def stop_time(self) -> float | None:
+        """End of the run [s]; None: it is open."""
+        return None if self.is_open else self.experiment.stop_time
 
     @cached_property
     def loops(self) -> tuple[Loop, ...]:
@@ -348,8 +358,12 @@ class Prepared:
         return [event for i, event in enumerate(self.events) if i not in happened]
 
 
-def prepare_options(options: SystemOptions) -> Prepared:
+def prepare_options(options: SystemOptions, *, is_open: bool = False) -> Prepared:
     """Load and prepare the system of a call in Python; flaws and doubts are Python's warnings.
+
+    Args:
+        options: of the call.
+        is_open: if set, the run need not have a stop time.
 
     Raises:
         InputError: there is no such system, or the request cannot be met.
@@ -370,7 +384,7 @@ def prepare_options(options: SystemOptions) -> Prepared:
         raise InputError(
             f"parameters: a mapping by component.parameter, not {options.parameters!r}"
         )
-    prepared = prepare(scenario, system, options)
+    prepared = prepare(scenario, system, options, is_open=is_open)
     warn_of(findings, [] if options.system is system else prepared.doubts(), _STACK_LEVEL)
     return prepared
 
@@ -385,8 +399,19 @@ def prepare_request(request: Request) -> Prepared:
     return prepare(*load_scenario(request.scenario, request.kind), request)
 
 
-def prepare(scenario: Scenario, system: System, request: Request | SystemOptions) -> Prepared:
+def prepare(
+    scenario: Scenario,
+    system: System,
+    request: Request | SystemOptions,
+    *,
+    is_open: bool = False,
+) -> Prepared:
     """Apply a request to a scenario and its system.
+
+    Args:
+        scenario, system: of the run.
+        request: of the user.
+        is_open: if set, the run need not have a stop time.
 
     Raises:
         InputError: the request cannot be met.
@@ -407,7 +432,8 @@ def prepare(scenario: Scenario, system: System, request: Request | SystemOptions
         check_events("events", request.events)
         scenario = replace(scenario, events=request.events)
     stop_time = first_given(request.stop_time, scenario.stop_time, system.stop_time)
-    if stop_time is None:
+    is_open &= stop_time is None
+    if stop_time is None and not is_open:
         raise InputError(f"{scenario.name}: has no stop time; set one with --stop-time")
     system = replace(system, steps={**system.steps, **(request.steps or {})})
     step = first_given(request.step, scenario.step, system.step)
@@ -418,7 +444,10 @@ def prepare(scenario: Scenario, system: System, request: Request | SystemOptions
     coupling = first_given(request.coupling, scenario.coupling)
     if request.strict and coupling is None and order in (None, "feedthrough", "gauss-seidel"):
         coupling = "solve"
-    experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
+    start_time = system.start_time or 0.0
+    if stop_time is None:
+        stop_time = start_time + _MANY * step
+    experiment = Experiment(stop_time, step, order, start_time, coupling)
     isolation = Isolation.of(request.isolate, request.step_timeout)
     # A program is not a loop of FMUs.
     loop = request.loop if request.loop in Plan.LOOPS else Plan.LOOPS[0]
@@ -427,7 +456,7 @@ def prepare(scenario: Scenario, system: System, request: Request | SystemOptions
         followed = input_table.targets if input_table else ()
         events = read_events(scenario.name, scenario.events, replace(system, step=step), followed)
     findings.refuse()
-    return Prepared(scenario, plan, events, input_table)
+    return Prepared(scenario, plan, events, input_table, is_open)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

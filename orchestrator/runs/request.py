@@ -127,6 +127,7 @@ def _taking(declared: Callable[..., Any], before: int) -> Any:
         parameters.append(parameter.replace(annotation=hints[name], default=default))
 
     def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        name = function.__qualname__.removesuffix(".__init__")
         own = [*signature(function).parameters.values()][:before]
         arguments = textwrap.indent("\n".join(described), " " * 8).lstrip()
 
@@ -135,7 +136,7 @@ def _taking(declared: Callable[..., Any], before: int) -> Any:
             try:
                 shown.bind(*positional[before:], **keywords)
             except TypeError as error:
-                raise TypeError(f"{function.__name__}() {error}") from None
+                raise TypeError(f"{name}() {error}") from None
             return function(*positional[:before], declared(*positional[before:], **keywords))
 
         call.__doc__ = (function.__doc__ or "").replace("{arguments}", arguments)

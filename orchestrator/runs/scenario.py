@@ -573,7 +573,7 @@ def routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Map
         return [(port, None)]
     routes = [(c.target, c.transformation) for c in system.connections if c.source == port]
     if not routes:
-        raise InputError(f"{port} feeds nothing here: an event would change nothing")
+        raise InputError(f"{port} feeds nothing here: to change it would have no effect")
     return routes
 
 

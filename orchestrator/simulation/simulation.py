@@ -7,7 +7,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import Any, Literal, NamedTuple, TypeAlias, cast
+from typing import Any, Literal, NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
 
@@ -38,7 +38,7 @@ Loop = Literal["auto", "program", "compiled", "python"]
 
 
 class SimulationFailed(RuntimeError):
-    """A simulation that cannot go on; the text says when and why it stopped."""
+    """A simulation that cannot continue; the text says when and why it stopped."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,6 +127,38 @@ class _Settable(NamedTuple):
         return self.variable.typed(value, str(self.port))
 
 
+#: Causalities of ports with values.
+_VALUED = ("output", "input", "parameter")
+
+
+def ports_of(system: System, name: str, causalities: Sequence[str] = _VALUED) -> list[PortName]:
+    """Return the port of a name, or the members of a group.
+
+    Args:
+        system: with the ports.
+        name: of a port, a parameter or a group.
+        causalities: of groups; the first that a group has counts.
+
+    Raises:
+        InputError: there is none; the message has a suggestion.
+
+    """
+    if "." in name:
+        port = system.named(PortName.read(name))
+        if system.has(port) and system.variable(port).causality in _VALUED:
+            return [port]
+        for causality in causalities:
+            if members := system.members(name, (causality,)):
+                return members
+    known = [
+        f"{component.name}.{variable.name}"
+        for component in system.components.values()
+        for variable in component.variables.values()
+        if variable.causality in _VALUED
+    ]
+    raise InputError(f"no port or parameter {name!r}{did_you_mean(name, known)}")
+
+
 class State(NamedTuple):
     """A state of a simulation: see :meth:`Simulation.save`."""
 
@@ -151,13 +183,13 @@ class Simulation:
     until `del sim[name]`; an unconnected input keeps the value. A tunable parameter changes at
     once. In feedthrough order, a change shows at once in everything that depends on it.
 
-    It need not be used in a `with` statement, which frees FMUs at its end. Several simulations may
-    run in several threads, each in one at a time.
+    The end of a `with` statement, or :meth:`close`, frees FMUs. Several threads may step
+    simulations of their own.
 
     Attributes:
         loop: that makes the steps: `program`, `compiled` or `python`.
         step_size: length of a step [s].
-        stop_time: end of :meth:`run` [s].
+        stop_time: end of :meth:`run` [s]; None: there is none.
 
     """
 
@@ -172,17 +204,20 @@ class Simulation:
             ValueError: a name, a value or a file is not usable; the message says what to change.
 
         """
+        loops = get_args(Loop)
+        if options.loop not in loops:
+            raise InputError(f"loop {options.loop!r}: use one of {', '.join(loops)}")
         self._options = options
-        self._start(prepare_options(options))
+        self._start(prepare_options(options, is_open=True))
 
     def _start(self, prepared: Prepared) -> None:
         self._prepared = self._now = prepared
         self._rows = _Rows()
         self._session = self._opened()
         self.loop = cast(Loop, self._session.loop)
-        self.step_size, self.stop_time = prepared.experiment.step, prepared.experiment.stop_time
+        self.step_size, self.stop_time = prepared.experiment.step, prepared.stop_time
         components = prepared.system.components
-        #: Names of what acts at multiples of the step, or takes no others.
+        #: Events, tables and components that need whole steps of the same length.
         self._rigid = [
             *(["the scenario's events"] if prepared.events else []),
             *(["the table of inputs"] if prepared.input_table else []),
@@ -246,10 +281,10 @@ class Simulation:
         session = self._open()
         length = self.step_size if h is None else h
         if length != session.experiment.step:
-            self._check_free(f"a step of {length:g} s", length)
+            self._check_free(f"a step of {length:g} s")
             self._regrid(self.time, length)
         elif self._rigid and session.made >= session.experiment.full_steps:
-            self._check_free("a step after the stop time", length)
+            self._check_free("a step after the stop time")
         self._advance(session.made + 1)
 
     def run(self, until: float | None = None) -> None:
@@ -261,40 +296,45 @@ class Simulation:
         Raises:
             ValueError: the time has passed, or a component does not take such steps.
             SimulationFailed: a component fails, or has ended the run.
-            KeyboardInterrupt: Ctrl-C, after a whole step; the simulation can go on.
+            KeyboardInterrupt: Ctrl-C, after a whole step; the simulation can continue.
 
         """
         session = self._open()
         end, now = self.stop_time if until is None else until, self.time
+        if end is None:
+            raise InputError(f"{self._now.scenario.name}: has no stop time; use run(until=...)")
         if not end >= now:
             raise InputError(f"until = {end:g} s: the simulation has reached {now:g} s")
         if end == now:
             return
+        if session.experiment.step != self.step_size:
+            self._regrid(now, self.step_size)
         grid = replace(session.experiment, stop_time=end)
         if self._rigid:
-            whole = session.experiment.stop_time == grid.stop_time or (
-                not grid.has_short_step and grid.full_steps < session.experiment.rows
-            )
-            if not whole:
-                self._check_free(f"a run until {end:g} s", end)
+            is_end = end == session.experiment.stop_time
+            if not is_end and (
+                grid.has_short_step or grid.full_steps > session.experiment.full_steps
+            ):
+                self._check_free(f"a run until {end:g} s")
             self._advance(grid.rows - 1)
             return
         self._advance(grid.full_steps)
         if grid.has_short_step:
             session.regrid(grid)
             self._advance(grid.rows - 1)
-            self._regrid(end, session.experiment.step)
+            self._regrid(end, self.step_size)
 
-    def _check_free(self, what: str, length: float) -> None:
-        """Refuse what components, events and tables do not allow."""
+    def _check_free(self, what: str) -> None:
+        """Refuse steps that components, events or tables do not allow."""
         if self._rigid:
+            end = self._session.experiment.stop_time
             raise InputError(
                 f"{what}: {self._rigid[0]} allows whole steps of {self.step_size:g} s only, up to "
-                f"the stop time, {self.stop_time:g} s"
+                f"stop_time, {end:g} s"
             )
 
     def _regrid(self, start: float, step: float) -> None:
-        """Go on with steps of a length, without an end."""
+        """Continue with steps of a length, without an end."""
         experiment = self._session.experiment
         end = start + _MANY * step
         self._session.regrid(replace(experiment, start_time=start, step=step, stop_time=end))
@@ -312,15 +352,13 @@ class Simulation:
         self._check()
 
     def _check(self) -> None:
-        """Raise an exception if the session cannot go on."""
+        """Raise an exception if no step can follow."""
         session = self._session
         if (failure := session.failure or session.remark) is None:
             return
-        if numbers := session.ending.interrupts:
-            # Held back while the FMUs computed; now they act as usual.
-            session.failure = None
-            for number in numbers:
-                signal.raise_signal(number)
+        # Held back while the FMUs computed; now they act as usual.
+        for number in session.take_interrupts():
+            signal.raise_signal(number)
         raise SimulationFailed(failure)
 
     def _open(self) -> Session | ProgramSession:
@@ -360,39 +398,25 @@ class Simulation:
         if name == "time":
             return lambda: self.time
         system, header = self._now.system, self._session.header
-        ports = self._ports(name, ("output", "input"))
-        if ports:
+        try:
+            ports = ports_of(system, name)
+        except InputError as error:
+            raise KeyError(str(error)) from None
+        is_group = not system.has(PortName.read(name))
+        if str(ports[0]) in self._places:
             places = [self._places[str(port)] for port in ports]
-            if len(ports) == 1 and str(ports[0]) == name:
-                if name not in header.types:
-                    return places[0]
-                return lambda: header.values(name, self._as_row())[0]
-            return np.array(places)
-        parameters = self._ports(name, ("parameter",))
-        if not parameters:
-            known = [*self._places, *map(str, header.parameters)]
-            raise KeyError(f"no port or parameter {name!r}{did_you_mean(name, known)}")
-        if str(parameters[0]) == name:
-            [port] = parameters
-            variable = system.variable(port)
-            return lambda: variable.shown(self._session.parameter(port))
-        return lambda: np.array([self._session.parameter(port) for port in parameters])
+            if is_group:
+                return np.array(places)
+            if str(ports[0]) in header.types:
+                return lambda: header.values(str(ports[0]), self._as_row())[0]
+            return places[0]
+        if is_group:
+            return lambda: np.array([self._session.parameter(port) for port in ports])
+        variable = system.variable(ports[0])
+        return lambda: variable.shown(self._session.parameter(ports[0]))
 
     def _as_row(self) -> np.ndarray:
         return np.concatenate(([self.time], self._values()))[np.newaxis]
-
-    def _ports(self, name: str, causalities: Sequence[str]) -> list[PortName]:
-        """Return the port of a name, or the members of a group; empty: there is none."""
-        system = self._now.system
-        if "." not in name:
-            return []
-        port = system.named(PortName.read(name))
-        if system.has(port):
-            return [port] if system.variable(port).causality in causalities else []
-        for causality in causalities:
-            if members := system.members(name, (causality,)):
-                return members
-        return []
 
     def __setitem__(self, name: str, value: Any) -> None:
         """Override inputs, or set tunable parameters; of a group, with one value or one for each.
@@ -424,12 +448,13 @@ class Simulation:
 
         """
         session = self._open()
-        for settable in self._settable(name):
-            for target, _ in settable.targets:
-                if target not in self._held:
-                    raise InputError(f"{target} is not overridden")
-                session.release(target)
-                del self._held[target]
+        targets = [target for settable in self._settable(name) for target, _ in settable.targets]
+        for target in targets:
+            if target not in self._held:
+                raise InputError(f"{target} is not overridden")
+        for target in targets:
+            session.release(target)
+            del self._held[target]
 
     def _settable(self, name: str) -> list[_Settable]:
         """Return the ports of a name that can be set.
@@ -441,11 +466,7 @@ class Simulation:
         if name in self._settables:
             return self._settables[name]
         system = self._now.system
-        ports = self._ports(name, ("input", "output")) or self._ports(name, ("parameter",))
-        if not ports:
-            # Raises an error with a suggestion.
-            system.variable(system.named(PortName.read(name)))
-            raise InputError(f"{name} cannot be set")
+        ports = ports_of(system, name, ("input", "output", "parameter"))
         for port in ports:
             variable = system.variable(port)
             if variable.causality == "parameter" and variable.variability != "tunable":
@@ -556,7 +577,10 @@ class Simulation:
 
     def close(self) -> None:
         """Free the FMUs; nothing follows but :meth:`result`."""
-        self._closing()
+        if self._closing.alive:
+            # The last row needs FMUs to which values pass.
+            self._session.values()
+            self._closing()
 
     def __enter__(self) -> Simulation:
         return self

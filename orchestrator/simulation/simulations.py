@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 
 from orchestrator.cosim import Order, PortName, System, Value, Variable
-from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.errors import InputError
 from orchestrator.program.session import Place, ProgramSession, stepped_program
 from orchestrator.runs.preparation import prepare_options
 from orchestrator.runs.request import SystemOptions
 from orchestrator.runs.scenario import routes
+from orchestrator.simulation.simulation import ports_of
 
 #: Least number of simulations for which a further thread is worth its start.
 _WORTH_A_THREAD = 128
@@ -43,7 +44,7 @@ class Simulations:
     Attributes:
         n: number of simulations.
         step_size: length of a step [s].
-        stop_time: end of :meth:`run` [s].
+        stop_time: end of :meth:`run` [s]; None: there is none.
 
     """
 
@@ -82,14 +83,14 @@ class Simulations:
         each = {name: value for name, value in parameters.items() if _has_rows(value, n)}
         same = {name: value for name, value in parameters.items() if name not in each}
         options = SystemOptions(system, same, stop_time=stop_time, step=step, order=order)
-        prepared = prepare_options(options)
+        prepared = prepare_options(options, is_open=True)
         if prepared.events or prepared.input_table:
             raise InputError(f"{prepared.scenario.name}: has events or a table of inputs")
         self._prepared, self._system = prepared, prepared.system
         program = self._program = stepped_program(prepared.plan, is_quick=True)
         self._library = program.library
         experiment = prepared.experiment
-        self.step_size, self.stop_time = experiment.step, experiment.stop_time
+        self.step_size, self.stop_time = experiment.step, prepared.stop_time
         self._start_time = experiment.start_time
         self._memory = np.zeros((n, program.size), dtype=np.uint8)
         self._threads = min(threads or os.cpu_count() or 1, max(n // _WORTH_A_THREAD, 1))
@@ -146,6 +147,10 @@ class Simulations:
 
         """
         end = self.stop_time if until is None else until
+        if end is None:
+            raise InputError(
+                f"{self._prepared.scenario.name}: has no stop time; use run(until=...)"
+            )
         steps = (end - self._start_time) / self.step_size
         whole = round(steps)
         if abs(steps - whole) > 1e-9 * max(whole, 1):
@@ -181,7 +186,11 @@ class Simulations:
             self._is_stale = False
         if name in self._views:
             return self._views[name]
-        places = [self._place(port) for port in self._ports(name)]
+        try:
+            ports = ports_of(self._system, name)
+        except InputError as error:
+            raise KeyError(str(error)) from None
+        places = [self._place(port) for port in ports]
         view = self._view(places)
         if self._system.has(PortName.read(name)):
             view = view[:, 0]
@@ -189,18 +198,6 @@ class Simulations:
             view.flags.writeable = False
             self._views[name] = view
         return view
-
-    def _ports(self, name: str) -> list[PortName]:
-        system = self._system
-        if "." in name:
-            port = system.named(PortName.read(name))
-            if system.has(port):
-                return [port]
-            for causality in ("output", "input", "parameter"):
-                if members := system.members(name, (causality,)):
-                    return members
-        known = [*map(str, self._program.columns), *map(str, self._program.settables)]
-        raise KeyError(f"no port or parameter {name!r}{did_you_mean(name, known)}")
 
     def _place(self, port: PortName) -> Place:
         program = self._program
@@ -216,10 +213,7 @@ class Simulations:
             ValueError: there is no such input or parameter, or it does not take the values.
 
         """
-        try:
-            ports = self._ports(name)
-        except KeyError as error:
-            raise InputError(str(error.args[0])) from None
+        ports = ports_of(self._system, name, ("input", "output", "parameter"))
         columns = _columns(name, values, self.n, len(ports))
         for port, column in zip(ports, columns, strict=True):
             variable = self._system.variable(port)
@@ -263,7 +257,7 @@ class Simulations:
             ValueError: there is no such input.
 
         """
-        for port in self._ports(name):
+        for port in ports_of(self._system, name, ("input", "output")):
             for target, _ in routes(self._system, port):
                 for i in range(self.n):
                     memory = self._memory[i].ctypes.data
@@ -297,11 +291,11 @@ class Simulations:
             numbers = np.ascontiguousarray(np.atleast_1d(numbers[which]))
         values = self._values.copy() if parameters else self._values
         for name, given in (parameters or {}).items():
-            ports = self._ports(name)
+            ports = ports_of(self._system, name, ("parameter", "input"))
             columns = _columns(name, given, len(numbers), len(ports))
             for port, column in zip(ports, columns, strict=True):
                 if port not in self._program.settables:
-                    raise InputError(f"{port} is no parameter")
+                    raise InputError(f"{port} is not a parameter")
                 number, _ = self._program.settables[port]
                 values[numbers, number] = _numbers(self._system.variable(port), column, port)
         self._library.begin_all(
@@ -374,5 +368,5 @@ def _numbers(variable: Variable, values: np.ndarray, port: PortName) -> np.ndarr
 
 
 def _number(variable: Variable, value: Value) -> float:
-    """Return the number of a value, such as that of an item of an Enumeration."""
+    """Return the number of a value; an item of an Enumeration has one."""
     return float(variable.items[value] if isinstance(value, str) else value)
