@@ -86,7 +86,7 @@ class SessionState(NamedTuple):
 class Session:
     """A system whose FMUs are loaded, and stepped by calls of :meth:`advance`.
 
-    It is a context manager, which loads the FMUs, exchanges initial values, and frees the FMUs.
+    It is a context manager: it loads the FMUs, exchanges initial values, and frees the FMUs.
 
     Attributes:
         plan: of the run.
@@ -172,6 +172,10 @@ class Session:
         return nullcontext() if self._surroundings is None else self._surroundings.ours()
 
     def __enter__(self) -> Session:
+        """Open the session, unless it is open."""
+        return self if self._instances else self.open()
+
+    def open(self) -> Session:
         """Load the FMUs, and exchange initial values.
 
         Raises:

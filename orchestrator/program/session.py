@@ -215,6 +215,12 @@ class ProgramSession:
     def __exit__(self, *failure: object) -> None:
         """Do nothing: there is nothing to free."""
 
+    def end(self) -> Ending:
+        """Tell the observers how the run ended."""
+        for observer in self._observers:
+            observer.end(self.ending)
+        return self.ending
+
     def _take(self, plan: Plan) -> None:
         """Take the parameters of a plan."""
         program = self._program

@@ -159,6 +159,12 @@ def ports_of(system: System, name: str, causalities: Sequence[str] = _VALUED) ->
     raise InputError(f"no port or parameter {name!r}{did_you_mean(name, known)}")
 
 
+def _close(session: Session | ProgramSession) -> None:
+    """End a session, and free its FMUs."""
+    with session:
+        session.end()
+
+
 class State(NamedTuple):
     """A state of a simulation: see :meth:`Simulation.save`."""
 
@@ -225,7 +231,7 @@ class Simulation:
             *(name for name, component in components.items() if not component.takes_any_step),
         ]
         self._has_hooks = bool(prepared.events or prepared.input_table)
-        self._closing = weakref.finalize(self, self._session.__exit__, None, None, None)
+        self._closing = weakref.finalize(self, _close, self._session)
         self._names: dict[str, Any] = {}
         self._settables: dict[str, list[_Settable]] = {}
         self._begin()
@@ -248,7 +254,7 @@ class Simulation:
                     why = str(error)
         if options.loop == PROGRAM:
             raise InputError(f"loop {PROGRAM!r}: {why}")
-        return Session(prepared.plan, observers, prepared.hooks()).__enter__()
+        return Session(prepared.plan, observers, prepared.hooks()).open()
 
     def _begin(self) -> None:
         """Act on the first row, and leave the end open."""
