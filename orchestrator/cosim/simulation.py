@@ -273,7 +273,7 @@ class Session:
                 return None
             if run.interrupts.numbers:
                 failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
-            elif to_end:
+            if to_end:
                 run.show()
         except ComponentFailed as error:
             failure = f"stopped at t = {run.time:.12g} s: {error}"

@@ -22,9 +22,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
 from orchestrator.program.writer import CALLS, INPUT, STEP, Text
-
-#: Name of the loop.
-PROGRAM = "program"
+from orchestrator.runs.request import PROGRAM
 
 #: Rows in a block.
 _ROWS = 512

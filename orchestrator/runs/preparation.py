@@ -44,7 +44,7 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import Identity
 from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.request import Request, SystemOptions
+from orchestrator.runs.request import PROGRAM, Request, SystemOptions
 from orchestrator.runs.scenario import (
     Inputs,
     Scenario,
@@ -450,7 +450,7 @@ def prepare(
     experiment = Experiment(stop_time, step, order, start_time, coupling)
     isolation = Isolation.of(request.isolate, request.step_timeout)
     # A program is not a loop of FMUs.
-    loop = request.loop if request.loop in Plan.LOOPS else Plan.LOOPS[0]
+    loop = Plan.LOOPS[0] if request.loop == PROGRAM else request.loop
     plan = make_plan(system, experiment, isolation, loop)
     with findings.collecting():
         followed = input_table.targets if input_table else ()

@@ -150,6 +150,9 @@ def _taking(declared: Callable[..., Any], before: int) -> Any:
     return decorate
 
 
+#: The loop of systems that are stepped by their compiled program.
+PROGRAM = "program"
+
 #: Help of options that studies have, too.
 KIND = (
     "kind of the bundle's FMUs: python (source code) or native (its translation to C), with the "

@@ -25,9 +25,9 @@ from orchestrator.cosim import (
     Variable,
 )
 from orchestrator.machine.errors import InputError, did_you_mean
-from orchestrator.program.session import PROGRAM, ProgramSession
+from orchestrator.program.session import ProgramSession
 from orchestrator.runs.preparation import Prepared, prepare_options
-from orchestrator.runs.request import SystemOptions, method_takes_keywords, option
+from orchestrator.runs.request import PROGRAM, SystemOptions, method_takes_keywords, option
 from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import routes
 

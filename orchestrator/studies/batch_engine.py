@@ -29,8 +29,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
-from orchestrator.program.session import PROGRAM
 from orchestrator.program.writer import Text, indices_of
+from orchestrator.runs.request import PROGRAM
 from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import (
@@ -350,7 +350,7 @@ class BatchEngine:
         if compiled.program.run(values, experiment, rows) is None:
             raise InputError(f"{point.scenario}: a component has refused")
         system = programs.system.with_parameters(point.parameters)
-        columns = [*map(PortName.read, compiled.source.columns)]
+        columns = [system.named(PortName.read(name)) for name in compiled.source.columns]
         header = Header.of(system, experiment, columns, PROGRAM)
         return Table.of(header, rows, Ending())
 

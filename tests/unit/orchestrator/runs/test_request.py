@@ -138,12 +138,13 @@ def test_every_keyword_arrives(monkeypatch):
     """Each with its own value."""
     asked: list[Any] = []
 
-    def note(*arguments: Any, **options: Any) -> None:
+    def note(*arguments: Any, **_: Any) -> None:
         asked[:] = arguments
         raise StopIteration
 
-    monkeypatch.setattr("orchestrator.runs.run.load_scenario", lambda *_, **options: (None, None))
-    monkeypatch.setattr("orchestrator.runs.run.prepare", note)
+    preparation = "orchestrator.runs.preparation"
+    monkeypatch.setattr(f"{preparation}.load_scenario", lambda *_, **options: (None, None))
+    monkeypatch.setattr(f"{preparation}.prepare", note)
     monkeypatch.setattr("orchestrator.studies.sweep.complete_study", note)
     names = hints(simulate).keys() - OF_SIMULATE | {"parameters"}
     given = {name: {name: name} for name in names}

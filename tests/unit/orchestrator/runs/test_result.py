@@ -52,7 +52,10 @@ def failed() -> Result:
 
 
 def test_package_shows_its_names():
-    names = {"Result", "StudyResult", "load", "read", "simulate", "sweep"}
+    names = {
+        *("Result", "Simulation", "SimulationFailed", "Simulations", "StudyResult"),
+        *("load", "read", "simulate", "sweep"),
+    }
     assert set(orchestrator.__all__) == names <= set(dir(orchestrator))
     assert {getattr(orchestrator, name).__name__ for name in names} == names
     assert not hasattr(orchestrator, "nothing")

@@ -31,7 +31,7 @@ def ready(system: System, place: str) -> Iterator[tuple[Instance, Row]]:
     """Return the instance of a system of one component, initialised, and the row."""
     with held_interrupts() as interrupts:
         isolation = Isolation() if place == "isolated" else None
-        with place_instances(system.components, Log(), isolation, interrupts) as instances:
+        with place_instances(system.components, Log(), isolation, lambda: interrupts) as instances:
             row = Row(system, instances)
             ((name, instance),) = instances.items()
             instance.enter_initialization(system.parameters_of(name))

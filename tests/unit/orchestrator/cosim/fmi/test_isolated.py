@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -98,7 +98,7 @@ def run(system: System, n: int, length: float, outputs: list[float], note: bytes
 
     @contextmanager
     def answering_here(
-        _: Any, log: Log, isolation: Isolation, interrupts: Interrupts
+        _: Any, log: Log, isolation: Isolation, interrupts: Callable[[], Interrupts]
     ) -> Iterator[Any]:
         here, there = socket.socketpair()
         other = np.array([length, *outputs]).tobytes() + note
