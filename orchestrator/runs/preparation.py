@@ -241,7 +241,7 @@ def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> No
 
 def left_behind(scenario: Scenario) -> str | None:
     """Warn of parts of a scenario that are lost if only its system is kept."""
-    has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
+    has = {"events": bool(scenario.events), "inputs": bool(scenario.inputs)}
     if not any(has.values()):
         return None
     lost = " and ".join(name for name, there in has.items() if there)
@@ -276,14 +276,14 @@ class Prepared:
         scenario: as its file has it, except for events and inputs of the request.
         plan: the system, and its steps.
         events: of the run.
-        input_table: values of inputs over time; None: inputs keep their values.
+        input_tables: values of inputs over time; other inputs keep their values.
 
     """
 
     scenario: Scenario
     plan: Plan
     events: tuple[Event, ...] = ()
-    input_table: InputTable | None = None
+    input_tables: tuple[InputTable, ...] = ()
 
     @property
     def system(self) -> System:
@@ -303,23 +303,23 @@ class Prepared:
     @property
     def identity(self) -> Identity:
         """Everything that decides its rows."""
-        inputs = self.input_table.digest if self.input_table else ""
-        return self.plan.identity(self.events, inputs)
+        inputs = (table.digest for table in self.input_tables)
+        return self.plan.identity(self.events, " ".join(inputs))
 
     def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
-        """Make the run; `hooks` act before its table of inputs and its events do.
+        """Make the run; `hooks` act before its tables of inputs and its events do.
 
         Raises:
             InputError: an FMU or a parameter is not usable; nothing was stepped.
 
         """
-        own: list[Hook] = [] if self.input_table is None else [self.input_table.playback()]
+        own: list[Hook] = [table.playback() for table in self.input_tables]
         own += [Events(self.events)] if self.events else []
         return simulate_plan(self.plan, observers, [*hooks, *own])
 
     def doubts(self) -> list[str]:
         """Warn of possible omissions: inputs without a source, parameters of a vehicle."""
-        given = {*(self.input_table.targets if self.input_table else ())}
+        given = {target for table in self.input_tables for target in table.targets}
         for action in (event.action for event in self.events):
             values = action.values if isinstance(action, Alter) else ()
             values = action.inputs if isinstance(action, Set) else values
@@ -352,12 +352,11 @@ def prepare(scenario: Scenario, system: System, request: Request | SimulateOptio
     findings, values = Findings(request.strict), system.expanded(request.parameters or {})
     system = system.with_parameters(values)
     if request.inputs is not None:
-        scenario = replace(scenario, inputs=Inputs(Path(request.inputs), wins=True))
-    input_table = None
-    if scenario.inputs is not None:
-        given = {*values} if scenario.inputs.wins else {*values, *scenario.parameters}
-        with findings.collecting():
-            system, input_table = read_inputs(scenario.inputs, system, given)
+        files = [request.inputs] if isinstance(request.inputs, str | Path) else request.inputs
+        scenario = replace(scenario, inputs=[Inputs(Path(file), wins=True) for file in files])
+    input_tables: tuple[InputTable, ...] = ()
+    with findings.collecting():
+        system, input_tables = read_inputs(scenario.inputs, system, values, scenario.parameters)
     if isinstance(request.events, str):
         scenario = replace(scenario, events=read_scenario(request.events).events)
     elif request.events is not None:
@@ -379,10 +378,10 @@ def prepare(scenario: Scenario, system: System, request: Request | SimulateOptio
     isolation = Isolation.of(request.isolate, request.step_timeout)
     plan = make_plan(system, experiment, isolation, request.loop)
     with findings.collecting():
-        followed = input_table.targets if input_table else ()
+        followed = [target for table in input_tables for target in table.targets]
         events = read_events(scenario.name, scenario.events, replace(system, step=step), followed)
     findings.refuse()
-    return Prepared(scenario, plan, events, input_table)
+    return Prepared(scenario, plan, events, input_tables)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

@@ -197,7 +197,7 @@ class Scenario:
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     ours: Mapping[str, str] = field(default_factory=dict)
     events: Sequence[Mapping[str, Any]] = ()
-    inputs: Inputs | None = None
+    inputs: Sequence[Inputs] = ()
     digest: str = ""
 
     @property
@@ -273,8 +273,11 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
             raise InputError(f"{path}: {name} is already given by {waypoints['file']}")
         content["parameters"] |= parameters
     if "inputs" in content:
-        table = content["inputs"]
-        content["inputs"] = Inputs(**table | {"file": path.parent / table["file"]})
+        tables = content["inputs"]
+        content["inputs"] = [
+            Inputs(**table | {"file": path.parent / table["file"]})
+            for table in (tables if isinstance(tables, list) else [tables])
+        ]
     content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
@@ -294,21 +297,40 @@ def _read_system(content: dict[str, Any], folder: Path, vehicles: int | None) ->
 
 
 def read_inputs(
-    inputs: Inputs, system: System, given: Collection[PortName]
-) -> tuple[System, InputTable]:
-    """Read a table of inputs for :func:`with_input_table`.
+    inputs: Sequence[Inputs],
+    system: System,
+    given: Collection[PortName],
+    stated: Collection[PortName] = (),
+) -> tuple[System, tuple[InputTable, ...]]:
+    """Read tables of inputs for :func:`with_input_table`.
+
+    Args:
+        inputs: the tables.
+        system: with the inputs.
+        given: ports whose values come from the command line; no table may name them.
+        stated: ports whose values come from the scenario; only tables that win may name them.
 
     Raises:
-        InputError: the table cannot be read, or a column is not an available input.
+        InputError: a table cannot be read, or a column is not an available input, or is in another
+            table, too.
 
     """
-    columns = inputs.names
-    with _in_file(inputs.file):
-        targets = [system.named(PortName.read(name)) for name in columns]
-        variables = [system.variable(target) for target in targets]
-    times, *values = inputs.columns(variables)
-    with _in_file(inputs.file):
-        return with_input_table(system, targets, times, values, given, inputs.between)
+    tables, files = [], dict[PortName, Path]()
+    for each in inputs:
+        columns = each.names
+        with _in_file(each.file):
+            targets = [system.named(PortName.read(name)) for name in columns]
+            variables = [system.variable(target) for target in targets]
+            for target in targets:
+                if target in files:
+                    raise InputError(f"{target} is a column of {files[target]}, too")
+        files |= dict.fromkeys(targets, each.file)
+        times, *values = each.columns(variables)
+        taken = given if each.wins else [*given, *stated]
+        with _in_file(each.file):
+            system, table = with_input_table(system, targets, times, values, taken, each.between)
+        tables.append(table)
+    return system, tuple(tables)
 
 
 @contextmanager
