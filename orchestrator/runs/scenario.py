@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 
 from auv_fmu.guidance import path_planner
+from auv_fmu.guidance.follower import Follower
 from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.vehicle import Vehicle
@@ -460,11 +461,13 @@ def _planned(values: Mapping[str, Any]) -> Parameters:
     limits = (tuple(values[f"{end}.{name}"] for name in ACTUATORS) for end in Limits._fields)
     return Parameters(
         Waypoints(values["count"], x, y, z, t, timed, cruise, rounding),
-        Vehicle(*(values[name.replace("_", ".")] for name in Vehicle._fields)),
-        values["ell"],
-        Limits(*limits),
-        values["speed_max"],
-        values["turn_max"],
+        Follower(
+            Vehicle(*(values[name.replace("_", ".")] for name in Vehicle._fields)),
+            values["ell"],
+            Limits(*limits),
+            values["speed_max"],
+            values["turn_max"],
+        ),
     )
 
 
