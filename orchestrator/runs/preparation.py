@@ -56,6 +56,7 @@ from orchestrator.runs.scenario import (
     scenario_of,
     shared_events,
 )
+from orchestrator.runs.tracks import with_planners
 from orchestrator.runs.wiring import check_built, closed_loop, read_wiring
 from orchestrator.vehicle.cautions import differing_vehicle
 from orchestrator.vehicle.signals import Loop, loops_of
@@ -148,7 +149,8 @@ def load_scenario(
     if path is None or read is None:
         scenario = scenario_of(name) if isinstance(name, Mapping) else read_scenario(str(name))
         check_figure(scenario.figure)
-        system = closed_loop(current_fmus(kind, fmi), scenario)
+        folder = current_fmus(kind, fmi)
+        system = closed_loop(folder, with_planners(scenario, folder, kind))
         scenario = replace(scenario, parameters=system.expanded(scenario.parameters))
     else:
         check_brings_its_own(str(name), kind, fmi)
@@ -414,7 +416,8 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         only=scenario.only and [*scenario.only, *difference.components],
         parameters={},
     )
-    system = closed_loop(current_fmus(request.kind), companion)
+    folder = current_fmus(request.kind)
+    system = closed_loop(folder, with_planners(companion, folder, request.kind))
     fed = {connection.target for connection in system.connections}
 
     def shared(values: Mapping[PortName, Any]) -> dict[PortName, Any]:

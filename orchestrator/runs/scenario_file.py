@@ -163,7 +163,9 @@ class ScenarioFile(TomlTable):
     components: dict[str, Name | Literal[False]] = entry(
         "FMUs that replace the closed loop's own, or are added to them, as "
         '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
-        "this file. `false` removes a component, and its wires.",
+        "this file. The path of a .csv file stands for a planner that "
+        "[follows the table](../how-to/trajectories.md). `false` removes a component, and its "
+        "wires.",
         "none",
     )
     wires: dict[str, Name | Literal[False]] = entry(
