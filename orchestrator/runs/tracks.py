@@ -200,6 +200,4 @@ def planner_text(name: str, track: np.ndarray, source: str) -> str:
         "own_rows": "\n".join(f"    Row({a!r}, {(*b,)!r}, {(*c,)!r})," for a, b, c in rows),
     }
     text = _TEMPLATE.read_text(encoding="utf-8")
-    for word, value in values.items():
-        text = text.replace(word, value)
-    return text
+    return re.sub("|".join(values), lambda word: values[word[0]], text)

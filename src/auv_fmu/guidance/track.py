@@ -11,7 +11,7 @@ s since the first of them:
     b = (3 m - 2 v_0 - v_1) / T
     c = (v_0 + v_1 - 2 m) / T^2
 
-The velocities are those of the spline, which make ddy_d continuous.
+v makes ddy_d continuous in all rows.
 """
 
 from __future__ import annotations

@@ -97,7 +97,7 @@ def test_track_that_cannot_be_followed_is_refused_when_it_cannot(motion, why):
 
 @pytest.mark.parametrize("rows_apart", [0.1, 1.0, 10.0])
 def test_way_straight_back_is_refused_without_a_rest(rows_apart):
-    """Whether rows are close or far apart; it is slower than 0.1 m/s from 8 s to 12 s."""
+    """Close and far rows give the same answer; the path is slower than 0.1 m/s from 8 s to 12 s."""
     back = straight(1.0, 0.2, lambda t: (0.5 * t - 0.025 * t * t, 0.5 - 0.05 * t))
     times = np.arange(0.0, 20.0 + rows_apart / 2, rows_apart)
     with pytest.raises(ImpossiblePath, match=r"at t = 12\.?\d* s, .* straight back"):

@@ -42,7 +42,7 @@ def planner(folder: Path, t: np.ndarray, y: np.ndarray, name: str) -> ModuleType
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(4, 40))
-def test_velocities_are_those_of_scipy(seed, n):
+def test_velocities_equal_scipys(seed, n):
     random = np.random.default_rng(seed)
     t, y = np.cumsum(random.uniform(0.05, 5.0, n)), random.uniform(-10.0, 10.0, (n, 3))
     expected = CubicSpline(t, y)(t, 1)
@@ -59,7 +59,7 @@ def test_planner_is_the_spline_of_scipy_between_all_rows(tmp_path: Path):
 
 
 def test_posture_points_along_the_track_and_at_rest_as_before(tmp_path: Path):
-    """Before the track, as at its start; the centre of mass is ell behind the control point."""
+    """Before the track, as at its start; the control point is ell ahead of the centre of mass."""
     module = planner(tmp_path, TIMES, course(TIMES), "with_a_rest")
     begin = CubicSpline(TIMES, course(TIMES))(TIMES[0], 1)
     for t, (x, y, z) in ((0.0, begin), (STOP, (1.0, 0.64, 0.0)), (2000.0, (1.0, 0.64, 0.0))):
@@ -118,15 +118,15 @@ def test_mistakes_of_a_table_are_named_in_one_line(tmp_path: Path, text: str | N
 
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 def test_both_kinds_and_the_program_have_the_same_rows(workplace: Path):
-    """Of two vehicles whose tables have the same name, which is not a name in Python."""
+    """Tables of two vehicles have the same name, and not one of a module."""
     for k in (1, 2):
         Path(f"{k}").mkdir()
-        table = np.column_stack([TIMES[:20], course(TIMES[:20]) + 9.0 * k])
+        table = np.column_stack([TIMES[:20] - TIMES[0], course(TIMES[:20]) + 9.0 * k])
         np.savetxt(f"{k}/5-9 'é'.csv", table, delimiter=",", header="t,x,y,z", comments="")
     scenario = {
         "vehicles": 2,
         "components": {f"auv{k}.planner": f"{k}/5-9 'é'.csv" for k in (1, 2)},
-        "stop_time": 12.0,
+        "stop_time": 3.0,
     }
     python, native = (simulate(scenario, kind=kind) for kind in ("python", "native"))
     for name in python.columns:
@@ -134,7 +134,7 @@ def test_both_kinds_and_the_program_have_the_same_rows(workplace: Path):
     apart = native["auv2.planner.y_d.x"] - native["auv1.planner.y_d.x"]
     np.testing.assert_allclose(apart, 9.0, atol=1e-9)
     Path("two.toml").write_text(
-        "vehicles = 2\nstop_time = 12.0\n[components]\n"
+        "vehicles = 2\nstop_time = 3.0\n[components]\n"
         + "".join(f'"auv{k}.planner" = "{k}/5-9 \'é\'.csv"\n' for k in (1, 2))
     )
     assert main(["export", "two.toml", "--format", "fmu", "--out", "."]) == 0
