@@ -13,6 +13,7 @@ room                contents
 :mod:`.figures`     figures of runs and of studies
 :mod:`.runs`        scenarios, wiring, bundle, one run and its files
 :mod:`.program`     a system as one compiled program
+:mod:`.simulation`  a system that is stepped, or many side by side
 :mod:`.live`        the page in which a system runs
 :mod:`.exchange`    other tools: hosts, verification of their tables
 :mod:`.studies`     many runs
@@ -34,10 +35,15 @@ if TYPE_CHECKING:
     from orchestrator.runs.preparation import load
     from orchestrator.runs.result import Result, read
     from orchestrator.runs.run import simulate
+    from orchestrator.simulation.simulation import Simulation, SimulationFailed
+    from orchestrator.simulation.simulations import Simulations
     from orchestrator.studies.store import StudyResult
     from orchestrator.studies.sweep import sweep
 
-__all__ = ["Result", "StudyResult", "load", "read", "simulate", "sweep"]
+__all__ = [
+    "Result", "Simulation", "SimulationFailed", "Simulations", "StudyResult", "load", "read",
+    "simulate", "sweep",
+]  # fmt: skip
 
 if not TYPE_CHECKING:
     __getattr__, __dir__ = offered(
@@ -46,6 +52,8 @@ if not TYPE_CHECKING:
             "runs.preparation": "load",
             "runs.result": "Result read",
             "runs.run": "simulate",
+            "simulation.simulation": "Simulation SimulationFailed",
+            "simulation.simulations": "Simulations",
             "studies.store": "StudyResult",
             "studies.sweep": "sweep",
         },

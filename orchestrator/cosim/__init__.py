@@ -70,6 +70,7 @@ if TYPE_CHECKING:
     from orchestrator.cosim.observers import TableFile as TableFile
     from orchestrator.cosim.plan import Plan as Plan
     from orchestrator.cosim.plan import make_plan as make_plan
+    from orchestrator.cosim.simulation import Session as Session
     from orchestrator.cosim.simulation import simulate_plan as simulate_plan
     from orchestrator.cosim.stages import Stage as Stage
     from orchestrator.cosim.stages import Visit as Visit
@@ -91,7 +92,7 @@ _MODULES = {
     "hooks": "Hook InputTable RealTime Run",
     "observers": "Ending Header Observer Occurrence Selection Table TableFile",
     "plan": "Plan make_plan",
-    "simulation": "simulate_plan",
+    "simulation": "Session simulate_plan",
     "stages": "Stage Visit",
     "system": "System",
     "variables": "Value Variable",

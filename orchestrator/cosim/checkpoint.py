@@ -25,7 +25,7 @@ from uuid import uuid4
 import numpy as np
 
 from orchestrator.cosim.fmi.instance import Log
-from orchestrator.cosim.hooks import NEVER, Run, Stateful
+from orchestrator.cosim.hooks import NEVER, Run, stateful
 from orchestrator.cosim.observers import Ending, Header, NotKept
 from orchestrator.machine.disk import move_aside, sealed, unsealed, write_whole
 from orchestrator.machine.errors import InputError, reason
@@ -339,7 +339,7 @@ class Checkpoints:
                     name: b64encode(instance.state()).decode()
                     for name, instance in run.instances.items()
                 },
-                lasting=[part.state() for part in _stateful(run)],
+                lasting=[part.state() for part in stateful(run)],
             )
         except OSError as error:
             raise NotKept(f"stopped at t = {run.time:g} s: {reason(error)}") from error
@@ -355,7 +355,7 @@ class Checkpoints:
 
     def _resume(self, run: Run, stored: _Stored) -> None:
         # The meaning of rows is restored first: observers that get them need it.
-        for part, state in zip(_stateful(run), stored.lasting, strict=True):
+        for part, state in zip(stateful(run), stored.lasting, strict=True):
             part.restore(state)
         first = run.blocks.count  # computed again
         for rows in self._row_log.kept():
@@ -367,11 +367,6 @@ class Checkpoints:
         run.row.values[:] = stored.row
         for name, instance in run.instances.items():
             instance.restore(b64decode(stored.states[name]))
-
-
-def _stateful(run: Run) -> list[Stateful]:
-    hooks = [hook for hook in run.hooks if isinstance(hook, Stateful)]
-    return [run.row.strings, run.overrides, run.log, *hooks]
 
 
 def _read(folder: Path) -> _Stored | None:

@@ -287,9 +287,13 @@ class Component:
         """
         return self.arrays.get(name) or [self.variable(name)]
 
-    def having(self, causality: str) -> list[Variable]:
-        """Return the variables of one causality, in the order of the description."""
-        return [v for v in self.variables.values() if v.causality == causality]
+    def having(self, causality: str, fmi_type: str | None = None) -> list[Variable]:
+        """Return the variables of one causality and type, in the order of the description."""
+        return [
+            variable
+            for variable in self.variables.values()
+            if variable.causality == causality and fmi_type in (None, variable.type)
+        ]
 
     def start(self, name: str) -> Value | None:
         """Return the start value of a variable, in its type, if the description has one.

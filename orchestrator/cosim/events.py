@@ -70,7 +70,13 @@ class Layer(NamedTuple):
 _GROUND = -1
 
 
-def _tune(run: Run, target: PortName, value: Value) -> None:
+def tune(run: Run, target: PortName, value: Value) -> None:
+    """Set a tunable parameter.
+
+    Raises:
+        ComponentFailed: the FMU refuses the value, or does not keep it.
+
+    """
     instance = run.instances[target.component]
     instance.tune({target.port: value})
     held = instance.read([target.port])[target.port]
@@ -88,7 +94,7 @@ _EFFECTS: Mapping[str, Callable[[Run, PortName, Any], None]] = {
     "bias": lambda run, target, value: run.overrides.bias(target, value),
     "release": lambda run, target, _: run.overrides.release(target),
     "supply": lambda run, target, value: run.overrides.supply(target, value),
-    "tune": _tune,
+    "tune": tune,
 }
 
 #: Effects that give an input or a parameter a value; the others change what an input takes.
@@ -358,7 +364,8 @@ class Events:
         progress, layers, happened = state
         self._progress = [_Progress(*progress_of) for progress_of in progress]
         self._layers.restore(layers)
-        self._happened = [Occurrence(*fields) for fields in happened]
+        # The run has this list.
+        self._happened[:] = [Occurrence(*fields) for fields in happened]
 
     def _begins(self, run: Run, number: int) -> bool:
         event, progress_of = self._events[number], self._progress[number]

@@ -51,6 +51,7 @@ class Run:
         hooks: that act on the run.
         made: number of steps that have been made.
         due: number of steps after which a hook acts; every loop stops there.
+        until: number of steps after which the loop stops.
         happened: events, in their order.
 
     """
@@ -67,20 +68,21 @@ class Run:
     interrupts: Interrupts
     hooks: Sequence[Hook] = ()
     made: int = 0
-    due: int = NEVER
+    due: int = 0
+    until: int = NEVER
     happened: list[Occurrence] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Make all hooks due before the first step."""
         # By place: two hooks may be equal, or not hashable.
-        self._dues = [0] * len(self.hooks)
+        self.dues = [0] * len(self.hooks)
 
     def call_hooks(self) -> None:
         """Call the hooks that are due, in their order, and find when the next one is."""
         for i, hook in enumerate(self.hooks):
-            if self._dues[i] <= self.made:
-                self._dues[i] = hook.act(self)
-        self.due = min(self._dues, default=NEVER)
+            if self.dues[i] <= self.made:
+                self.dues[i] = hook.act(self)
+        self.due = min(self.dues, default=NEVER)
 
     @property
     def time(self) -> float:
@@ -149,6 +151,12 @@ class Stateful(Protocol):
 
     def restore(self, state: Any) -> None:
         """Restore the state."""
+
+
+def stateful(run: Run) -> list[Stateful]:
+    """Return the parts of a run with a state, besides its FMUs and its row."""
+    hooks = [hook for hook in run.hooks if isinstance(hook, Stateful)]
+    return [run.row.strings, run.overrides, run.log, *hooks]
 
 
 #: Time on the clock between two looks at it, in steps [s].

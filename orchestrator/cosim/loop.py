@@ -185,7 +185,7 @@ def step_compiled(library: CDLL, run: Run) -> Iterator[None]:
         if block.n == block.most:
             blocks.hand_over()
         made.value = run.made
-        outcome = advance(c_run, made, min(run.due, steps), _GLANCE, block, failure)
+        outcome = advance(c_run, made, min(run.due, run.until, steps), _GLANCE, block, failure)
         run.made = made.value
         yield
     if outcome == _FAILED:

@@ -24,6 +24,7 @@ import numpy as np
 
 from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.experiment import Experiment
+from orchestrator.cosim.system import System
 from orchestrator.cosim.variables import TYPES, Standing, StringTable, as_float32
 from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
 from orchestrator.machine.lazy import ROWS_AT_ONCE, parquet
@@ -58,6 +59,20 @@ class Header:
 
     #: Types whose values are not all doubles: texts, and integers of 64 bits.
     TYPES: ClassVar[frozenset[str]] = frozenset(name for name, kind in TYPES.items() if kind.stands)
+
+    @classmethod
+    def of(
+        cls, system: System, experiment: Experiment, columns: Sequence[PortName], loop: str
+    ) -> Header:
+        """Make the header of a run without FMUs, with the parameters of its system."""
+        parameters = {
+            name: variable.shown(system.value(name))
+            for component in system.components.values()
+            for variable in component.having("parameter")
+            for name in (PortName(component.name, variable.name),)
+        }
+        names = tuple(map(str, columns))
+        return cls(names, experiment, parameters, loop, units=system.units(columns))
 
     @cached_property
     def place(self) -> Mapping[str, int]:
@@ -231,6 +246,11 @@ class Blocks:
     def count(self) -> int:
         """Number of rows until now, handed over or not."""
         return self._told + int(self.block.n)
+
+    def restart(self, count: int) -> None:
+        """Hand over all rows, and count from another number on."""
+        self.hand_over()
+        self._told = count
 
     def append(self, t: float, values: np.ndarray) -> None:
         """Append a row."""

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim.component import Component
 from orchestrator.cosim.connection import Connection, Linear, Mapped, PortName
 from orchestrator.cosim.fmi.instance import Instance, Part
 from orchestrator.cosim.system import System
@@ -17,7 +16,6 @@ from orchestrator.cosim.variables import (
     Standing,
     StringTable,
     Value,
-    Variable,
     are_of,
     references_of,
 )
@@ -57,13 +55,7 @@ class Row:
             hidden: components whose outputs are hidden at first.
 
         """
-        groups = [
-            (name, causality, fmi_type, ports)
-            for name in instances
-            for causality in ("input", "output")
-            for fmi_type in TYPES
-            if (ports := ports_of_type(system.components[name], causality, fmi_type))
-        ]
+        groups = [*system.columns()]
         n = sum(len(ports) for *_, ports in groups)
         more = sum(
             len(ports) for name, causality, _, ports in groups if _hides(name, causality, hidden)
@@ -210,11 +202,6 @@ class Row:
 
 def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
     return causality == "output" and component in hidden
-
-
-def ports_of_type(component: Component, causality: str, fmi_type: str) -> list[Variable]:
-    """Return the inputs or outputs of a type, in the order of a row."""
-    return [variable for variable in component.having(causality) if variable.type == fmi_type]
 
 
 class Gathering:

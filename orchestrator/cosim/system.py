@@ -25,7 +25,7 @@ from orchestrator.cosim.connection import (
     likely_port,
 )
 from orchestrator.cosim.experiment import MOST_STEPS, Experiment, Order
-from orchestrator.cosim.variables import Value, Variable
+from orchestrator.cosim.variables import TYPES, Value, Variable
 from orchestrator.machine.disk import plain_file_names
 from orchestrator.machine.errors import InputError, did_you_mean, listed
 from orchestrator.machine.texts import is_finite
@@ -440,6 +440,24 @@ class System:
 
         """
         return self.component(port.component).variable(port.port)
+
+    def columns(self) -> Iterator[tuple[str, str, str, list[Variable]]]:
+        """Yield the columns of a row: neighbours have the same component, causality and type.
+
+        Yields:
+            The component, the causality, the type, and the ports, in the order of the description.
+
+        """
+        for name, component in self.components.items():
+            for causality in ("input", "output"):
+                for fmi_type in TYPES:
+                    if ports := component.having(causality, fmi_type):
+                        yield name, causality, fmi_type, ports
+
+    def units(self, ports: Iterable[PortName]) -> dict[str, str]:
+        """Return the units of the ports that have one."""
+        units = {str(port): self.variable(port).unit for port in ports}
+        return {name: unit for name, unit in units.items() if unit is not None}
 
     def check(self) -> None:
         """Check connections and parameters against the descriptions of the FMUs.

@@ -348,7 +348,7 @@ class Variable(NamedTuple):
             raise InputError(f"{name}{shown}: not {words}") from None
         if isinstance(number, float) and not isfinite(number):
             raise InputError(f"{name}{shown}: must be finite")
-        lower, upper = self._range
+        lower, upper = self.range
         if number < lower:
             raise InputError(f"{name}{shown}: must be at least {_written(lower)}")
         if number > upper:
@@ -414,7 +414,7 @@ class Variable(NamedTuple):
         return type(value) is {"Real": float, "Boolean": bool}.get(self.family)
 
     @property
-    def _range(self) -> tuple[float, float]:
+    def range(self) -> tuple[float, float]:
         """Range of the description, limited by the type."""
         own = TYPES[self.type]
         lower = own.least if self.min is None else max(own.least, _end(self.min))

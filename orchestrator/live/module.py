@@ -132,7 +132,7 @@ class Programs:
         return (self._numbers[written], text) if written in self._numbers else None
 
     def _text(self, run: Prepared, definitions: Mapping[str, Definition]) -> Text:
-        return Text(run.plan, definitions, alters=True, shared=self._equations)
+        return Text(run.plan, definitions, has_events=True, shared=self._equations)
 
 
 def _definitions_of(run: Prepared) -> dict[str, Definition]:

@@ -23,7 +23,7 @@ typedef struct {
 
 enum { OVERRIDE, BIAS, FREEZE, RELEASE, SET_VALUE, RESET, END };
 enum { BELOW, AT_MOST, ABOVE, AT_LEAST };
-enum { WELL, REFUSED, ENDED };
+enum { ENDED = REFUSED + 1 };
 
 /* More steps than any run has. */
 enum { NEVER = 1000000001 };
@@ -42,32 +42,6 @@ typedef struct {
     double *happened; /* number of entries, then of each entry: event, step, 1 if it ends */
     double turn;      /* highest rank so far */
 } course;
-
-/* Sets the factor and offset of an input, for its connection or its own value. */
-static void alter(simulation *it, int i, double factor, double offset) {
-    it->factors[i] = factor;
-    it->offsets[i] = offset;
-    if (!inputs[i].is_fed) put(it, columns[inputs[i].column], factor * it->supplied[i] + offset);
-}
-
-/* Sets a tunable parameter or an unconnected input to a value in its range. Returns REFUSED if the
- * component refuses it. */
-EXPORTED int set(simulation *it, int which, double value) {
-    const settable *of = &settables[which];
-    const double before = get(it, of->at);
-    if (of->input >= 0) {
-        it->supplied[of->input] = value;
-        alter(it, of->input, it->factors[of->input], it->offsets[of->input]);
-    } else {
-        put(it, of->at, value);
-        if (retune(it, of->component)) {
-            put(it, of->at, before);
-            it->port = which;
-            return REFUSED;
-        }
-    }
-    return WELL;
-}
 
 /* Current values */
 

@@ -87,6 +87,8 @@ class Program:
 
     Attributes:
         source: its source.
+        library: its functions.
+        size: bytes of a simulation.
 
     """
 
@@ -98,8 +100,8 @@ class Program:
 
         """
         self.source = source
-        self._library = _loaded(source)
-        self._size = self._library.size_of_simulation()
+        self.library = _loaded(source)
+        self.size = self.library.size_of_simulation()
         self._memory = _ThreadMemory()
 
     def run(
@@ -119,7 +121,7 @@ class Program:
             Its indices, NaN for missing ones; None: a component has refused a value.
 
         """
-        memory, library = self._memory.of_size(self._size), self._library
+        memory, library = self._memory.of_size(self.size), self.library
         steps = experiment.rows - 1
         if library.begin(
             memory, values.ctypes.data, experiment.start_time, experiment.step,

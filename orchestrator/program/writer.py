@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 from auv_fmu.paper import euler
 from fmus.language import tree
 from fmus.language.build import Program, Untranslatable
-from fmus.language.types import FLOAT, Array, Type, is_whole
+from fmus.language.types import FLOAT, INT, Array, Type, is_whole
 from fmus.native.emit import Emitter, closed, members, number_in_c
 from fmus.native.names import RUNTIME, in_c
 from fmus.native.pieces import Place, function, scalars, structure
@@ -95,6 +95,9 @@ int(raise_error)(Error *error, const char *what, ...);
         if (test) raise_error(error, __VA_ARGS__);    \\
     } while (0)
 """
+
+#: Type of texts, for programs that keep the messages of errors.
+_STRING = "typedef const char *string;"
 
 _CHECKS = """\
 /* Partial sums, for vector instructions. */
@@ -191,9 +194,11 @@ EXPORTED void failure(const simulation *it, int found[]) {
 EXPORTED int rows_shown(const simulation *it) { return it->shown; }"""
 
 
-_EVENTS = Path(__file__).with_name("events.c")
+_CHANGES, _EVENTS, _STEPPING = (
+    Path(__file__).with_name(f"{name}.c") for name in ("changes", "events", "stepping")
+)
 
-_EVENT_TABLES = """\
+_CHANGE_TABLES = """\
 /* A number of the simulation. */
 typedef struct {{
     size_t place;
@@ -264,11 +269,18 @@ _BEGINNING = (
     "for (int i = 0; i < COMPONENTS; i++) it->started[i] = start_time;",
 )
 
-#: Definitions for systems in which values pass along connections before a row, or not.
-_PASSING = {
-    True: "enum { HAS_PASSING = 1 };\n\n#define PASS(it, k, t) pass(it, k, t, &(Error){0})",
-    False: "enum { HAS_PASSING = 0 };\n\n#define PASS(it, k, t) 0",
-}
+#: Place of the output `fault` of a component that has refused nothing.
+_NO_FAULT = Place("it->no_fault", INT)
+
+#: An error within a function, and one that the simulation keeps.
+_NOTED = "Error noted = {0}, *error = &noted;"
+_KEPT = "Error *error = fresh(it);"
+
+_FRESH = """\
+static inline Error *fresh(simulation *it) {
+    it->noted.raised = 0;
+    return &it->noted;
+}"""
 
 
 class Unsupported(InputError):
@@ -419,12 +431,21 @@ class Equations:
         return [text for part in self._parts for text in part.text()]
 
 
-def head_of(equations: Equations) -> str:
+def head_of(equations: Equations, *, keeps_messages: bool = False) -> str:
     """Return the beginning of a source with equations."""
-    arithmetic = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
-    noise = (RUNTIME / "noise.c").read_text(encoding="utf-8")
-    arithmetic = arithmetic.replace('#include "error.h"\n', _FAILURE)
-    parts = [_INCLUDES, arithmetic, *([noise] if equations.is_noisy else [])]
+    text, error, arithmetic, noise = (
+        (RUNTIME / name).read_text(encoding="utf-8")
+        for name in ("text.c", "error.h", "arithmetic.h", "noise.c")
+    )
+    failure = [_FAILURE]
+    if keeps_messages:
+        failure = [
+            _STRING,
+            text.replace('#include "host.h"\n', ""),
+            error.replace('#include "text.c"\n', ""),
+        ]
+    arithmetic = arithmetic.replace('#include "error.h"\n', "")
+    parts = [_INCLUDES, *failure, arithmetic, *([noise] if equations.is_noisy else [])]
     return "\n\n".join(_GUARD.sub("", part).strip() for part in parts)
 
 
@@ -471,7 +492,8 @@ class Text:
         indices: indices that it computes.
         is_tuned: if set, parameters may change after the start.
         is_hosted: if set, a host passes the time of each step.
-        alters: if set, events can happen.
+        has_events: if set, events can happen.
+        is_stepped: if set, a host makes single steps, and changes values between them.
         is_quick: if set, outputs and states are checked together, once a step, without finding out
             which component refuses.
         shared: equations that it shares with other programs; None: its own.
@@ -483,7 +505,8 @@ class Text:
     indices: Sequence[Index] = ()
     is_tuned: bool = False
     is_hosted: bool = False
-    alters: bool = False
+    has_events: bool = False
+    is_stepped: bool = False
     is_quick: bool = False
     shared: Equations | None = None
 
@@ -510,7 +533,10 @@ class Text:
         )
         self.stages = self.plan.stages()
         self.passes = self.stages.passing is not None
+        #: If set, values may change between steps.
+        self.alters = self.has_events or self.is_stepped
         self.is_tuned = self.is_tuned or self.alters
+        self._noted = _KEPT if self.is_stepped else _NOTED
         self.components = [*self.plan.system.components]
         self.members = dict(zip(self.components, _distinct(self.components), strict=True))
         self.slow = [name for name, n in self.plan.decimations.items() if n > 1]
@@ -548,7 +574,14 @@ class Text:
         for name in self.components:
             places |= self._inputs(name)
             places |= self._outputs(name, "_shown" if name in self.slow else ".outputs")
-        return places
+        if not self.is_stepped:
+            return places
+        # The columns of a run of FMUs, each of which has an output for faults.
+        return {
+            port: places.get(port, _NO_FAULT)
+            for name, _, _, ports in self.plan.system.columns()
+            for port in (PortName(name, variable.name) for variable in ports)
+        }
 
     @cached_property
     def inputs(self) -> dict[PortName, int]:
@@ -570,11 +603,18 @@ class Text:
             places |= {port: place for port, place in inputs if port not in fed}
         return places
 
-    def start(self, name: PortName) -> float | int | bool:
-        """Return the value of a parameter or an unconnected input at the start."""
-        value, port = self.plan.system.value(name), self.ports[name]
+    def start(self, name: PortName, system: System | None = None) -> float | int | bool:
+        """Return the value of a parameter or an unconnected input at the start.
+
+        Args:
+            name: of the parameter or input.
+            system: with other values of the same parameters; None: the system of the plan.
+
+        """
+        system = system or self.plan.system
+        value, port = system.value(name), self.ports[name]
         if isinstance(value, str):
-            value = int(self.plan.system.variable(name).items[value])
+            value = int(system.variable(name).items[value])
         if value is None:
             value = port.start or 0
         types: dict[str, type[float | int | bool]] = {"Real": float, "Boolean": bool}
@@ -634,8 +674,14 @@ class Text:
         """Return the whole program."""
         # Without the name of the system, so that equal systems have the same program.
         title = closed(f"{listed(self.components)} as one program.")
-        parts = [f"/* {title} */", head_of(self.equations), *self.core(), *self.calls()]
+        head = head_of(self.equations, keeps_messages=self.keeps_messages)
+        parts = [f"/* {title} */", head, *self.core(), *self.calls()]
         return "\n\n".join(parts) + "\n"
+
+    @property
+    def keeps_messages(self) -> bool:
+        """True if the program keeps the message of an error."""
+        return self.is_stepped and not self.is_quick
 
     def apart(self) -> str:
         """Return the program without the equations, with a header for them."""
@@ -654,7 +700,7 @@ class Text:
     def calls(self) -> list[str]:
         """Return the functions that a host calls."""
         return [
-            *([self._event_tables()] if self.alters else []),
+            *([self._tables_of_changes()] if self.alters else []),
             EXPORTED,
             self._begin(),
             f"enum {{ WIDTH = {1 + len(self.columns)} }};",
@@ -662,7 +708,7 @@ class Text:
             *self._look(),
             *self._run(),
             _ACCESS,
-            *([self._event_text()] if self.alters else []),
+            *self._changes(),
         ]
 
     def _simulation(self) -> str:
@@ -688,9 +734,17 @@ class Text:
                 f"double started[{len(self.components)}]; /* start times of components [s] */",
                 "int due; /* number of steps after which an event needs action */",
             ]
+        if self.is_stepped:
+            rows += [
+                "Error noted;",
+                "int is_passed; /* if set, values have passed since the last change */",
+                "int has_failed; /* if set, a component has refused */",
+                "int no_fault; /* 0 */",
+            ]
         whole = structure("simulation", rows)
         calls = f"enum {{ {', '.join(CALLS)} }};"
-        return f"/* All values of a run. */\n{whole}\n\n{calls}"
+        fresh = f"\n\n{_FRESH}" * self.is_stepped
+        return f"/* All values of a run. */\n{whole}\n\n{calls}{fresh}"
 
     # The start
 
@@ -704,8 +758,8 @@ class Text:
 
     def _begin(self) -> str:
         lines = [
-            "Error noted = {0};",
             "memset(it, 0, sizeof *it);",
+            self._noted,
             "it->start_time = start_time;",
             "it->step = step;",
             "it->stop_time = stop_time;",
@@ -713,7 +767,7 @@ class Text:
             "it->steps = steps;",
             *(_BEGINNING if self.alters else self.set_parameters()),
             *self.unsplit(),
-            "return come_to_rest(it, &noted) != 0;",
+            "return come_to_rest(it, error) != 0;",
         ]
         doc = "Sets parameters and settles values at the start. Returns 1 if a component refuses."
         return _function(doc, _BEGIN, lines, ())
@@ -933,7 +987,7 @@ class Text:
             n += sum(map(len, reducer.results.values()))
         lines.append("it->looked = t;")
         give_lines = [
-            "Error noted = {0}, *error = &noted;",
+            _NOTED,
             "int raised = 0;",
             *gives,
             "return raised + noted.raised;",
@@ -975,20 +1029,29 @@ class Text:
             ],
             ("t",),
         )
-        lines = ["Error noted = {0}, *error = &noted;"]
+        lines = [self._noted]
         if self.passes:
-            row = ["if (pass(it, k, time_after(it, k), error)) return 1;", "keep(it, k, rows);"]
-            lines += [
-                "while (it->made < until) {",
-                "    const int k = it->made;",
-                *(f"    {line}" for line in row),
-                "    if (make_step(it, k, time_after(it, k), error)) return 1;",
-                "    it->made = k + 1;",
-                "}",
+            known = "!it->is_passed && " * self.is_stepped
+            row = [
+                f"if ({known}pass(it, k, time_after(it, k), error)) return 1;",
+                "keep(it, k, rows);",
+            ]
+            last = [
                 "if (it->made == it->steps && it->shown == it->steps) {",
                 "    const int k = it->made;",
                 *(f"    {line}" for line in row),
                 "}",
+            ]
+            lines += [
+                "while (it->made < until) {",
+                "    const int k = it->made;",
+                *(f"    {line}" for line in row),
+                *(["    it->is_passed = 0;"] * self.is_stepped),
+                "    if (make_step(it, k, time_after(it, k), error)) return 1;",
+                "    it->made = k + 1;",
+                "}",
+                # The host of single steps asks for the last row.
+                *([] if self.is_stepped else last),
             ]
         else:
             lines += [
@@ -1150,7 +1213,7 @@ class Text:
 
     # Events
 
-    def _event_tables(self) -> str:
+    def _tables_of_changes(self) -> str:
         """Return the tables of numbers that a host and events can set or read."""
         fed = {wire.target: wire.transformation for wire in self.plan.system.connections}
         places = {name: i for i, name in enumerate(self.columns)}
@@ -1167,7 +1230,7 @@ class Text:
             f"    {{{_number(place)}, {components[name.component]}, {self.inputs.get(name, -1)}}},"
             for name, place in self.parameters.items()
         ]
-        return _EVENT_TABLES.format(
+        return _CHANGE_TABLES.format(
             columns="\n".join(f"    {_number(place)}," for place in self.columns.values()),
             inputs="\n".join(inputs),
             settables="\n".join(settables),
@@ -1176,11 +1239,22 @@ class Text:
             n_settables=len(settables),
         )
 
-    def _event_text(self) -> str:
-        """Return the part of the program that makes events happen."""
-        source = _EVENTS.read_text(encoding="utf-8").strip()
-        changes = (self._retune(), self._restart(), self._restarts())
-        return "\n\n".join([_PASSING[self.passes], *changes, source])
+    def _changes(self) -> list[str]:
+        """Return the parts of the program that change values between steps."""
+        if not self.alters:
+            return []
+        error = "fresh(it)" if self.is_stepped else "&(Error){0}"
+        passed = f"pass(it, k, t, {error})" if self.passes else "0"
+        reason = "it->noted.why.text" if self.keeps_messages else '""'
+        defined = [
+            f"enum {{ HAS_PASSING = {int(self.passes)} }};",
+            f"#define PASS(it, k, t) {passed}",
+            f"#define REASON(it) {reason}",
+        ]
+        restarts = [self._restart(), self._restarts()] if self.has_events else []
+        sources = [_CHANGES, *[_EVENTS] * self.has_events, *[_STEPPING] * self.is_stepped]
+        texts = [path.read_text(encoding="utf-8").strip() for path in sources]
+        return ["\n".join(defined), self._retune(), *restarts, *texts]
 
     def _retune(self) -> str:
         """Return the function that adopts parameters of a component that changed between steps."""
@@ -1196,7 +1270,7 @@ class Text:
                 lines += self._evaluated(name)
             cases[i] = [*lines, "return 0;"]
         doc = "Adopts changed parameters of a component. Returns 1 if it refuses them."
-        return _switch(doc, "retune(simulation *it, int component)", cases)
+        return _switch(doc, "retune(simulation *it, int component)", [self._noted], cases)
 
     def _restart(self) -> str:
         cases = {
@@ -1209,7 +1283,7 @@ class Text:
         }
         doc = "Restarts a component with its current inputs. Returns 1 if it refuses."
         head = "restart(simulation *it, const simulation *now, int component, double t)"
-        return _switch(doc, head, cases)
+        return _switch(doc, head, [self._noted], cases)
 
     def _restarts(self) -> str:
         rows = (
@@ -1239,14 +1313,15 @@ def _number(place: Place) -> str:
     )
 
 
-def _switch(doc: str, head: str, cases: Mapping[int, Sequence[str]]) -> str:
-    """Return a C function with a case for each component."""
+def _switch(doc: str, head: str, first: Sequence[str], cases: Mapping[int, Sequence[str]]) -> str:
+    """Return a C function with some statements, and a case for each component."""
+    before = "".join(f"    {line}\n" for line in first)
     body = "".join(
         f"    case {i}:\n" + "".join(f"        {line}\n" for line in lines)
         for i, lines in cases.items()
     )
     return (
-        f"/* {doc} */\nstatic int {head} {{\n    Error noted = {{0}}, *error = &noted;\n"
+        f"/* {doc} */\nstatic int {head} {{\n{before}"
         f"    switch (component) {{\n{body}    }}\n    return 0;\n}}"
     )
 

@@ -44,7 +44,7 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import Identity
 from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.bundle import current_fmus
-from orchestrator.runs.request import Request, SimulateOptions
+from orchestrator.runs.request import Request, SystemOptions
 from orchestrator.runs.scenario import (
     Inputs,
     Scenario,
@@ -68,6 +68,12 @@ DEFAULT_STEP = STEP
 
 #: Stop time of a system without one, if it is only checked or exported [s].
 FALLBACK_STOP_TIME = 1.0
+
+#: The caller of a function of the Python interface, seen from where it is warned.
+_STACK_LEVEL = 5
+
+#: Number of steps of a run without an end.
+_MANY = 500_000_000
 
 # Loading
 
@@ -279,6 +285,7 @@ class Prepared:
         plan: the system, and its steps.
         events: of the run.
         input_tables: values of inputs over time; other inputs keep their values.
+        is_open: if set, nothing says when the run ends.
 
     """
 
@@ -286,6 +293,7 @@ class Prepared:
     plan: Plan
     events: tuple[Event, ...] = ()
     input_tables: tuple[InputTable, ...] = ()
+    is_open: bool = False
 
     @property
     def system(self) -> System:
@@ -296,6 +304,11 @@ class Prepared:
     def experiment(self) -> Experiment:
         """Times, step and order of the run."""
         return self.plan.experiment
+
+    @property
+    def stop_time(self) -> float | None:
+        """End of the run [s]; None: it is open."""
+        return None if self.is_open else self.experiment.stop_time
 
     @cached_property
     def loops(self) -> tuple[Loop, ...]:
@@ -315,9 +328,22 @@ class Prepared:
             InputError: an FMU or a parameter is not usable; nothing was stepped.
 
         """
-        own: list[Hook] = [table.playback() for table in self.input_tables]
-        own += [Events(self.events)] if self.events else []
-        return simulate_plan(self.plan, observers, [*hooks, *own])
+        return simulate_plan(self.plan, observers, [*hooks, *self.hooks()])
+
+    def hooks(self) -> list[Hook]:
+        """Return hooks for its tables of inputs and its events."""
+        hooks: list[Hook] = [table.playback() for table in self.input_tables]
+        return hooks + ([Events(self.events)] if self.events else [])
+
+    def with_parameters(self, values: Mapping[str, object]) -> Prepared:
+        """Return the run with further values of parameters.
+
+        Raises:
+            InputError: a name or a value is not usable.
+
+        """
+        system = self.system.with_parameters(values)
+        return replace(self, plan=replace(self.plan, system=system))
 
     def doubts(self) -> list[str]:
         """Warn of possible omissions: inputs without a source, parameters of a vehicle."""
@@ -334,6 +360,37 @@ class Prepared:
         return [event for i, event in enumerate(self.events) if i not in happened]
 
 
+def prepare_options(options: SystemOptions, *, is_open: bool = False) -> Prepared:
+    """Load and prepare the system of a call in Python; flaws and doubts are Python's warnings.
+
+    Args:
+        options: of the call.
+        is_open: if set, the run need not have a stop time.
+
+    Raises:
+        InputError: there is no such system, or the request cannot be met.
+
+    """
+    system, findings = options.system, Findings(options.strict)
+    if isinstance(system, System):
+        check_brings_its_own(str(system), options.kind)
+        if options.variant is not None:
+            raise InputError(f"{system}: has no variants; give it to load")
+        scenario = Scenario(system.name)
+    else:
+        scenario, system = load_scenario(
+            system, options.kind, variant=options.variant, findings=findings
+        )
+        findings.refuse()
+    if not isinstance(options.parameters, Mapping | None):
+        raise InputError(
+            f"parameters: a mapping by component.parameter, not {options.parameters!r}"
+        )
+    prepared = prepare(scenario, system, options, is_open=is_open)
+    warn_of(findings, [] if options.system is system else prepared.doubts(), _STACK_LEVEL)
+    return prepared
+
+
 def prepare_request(request: Request) -> Prepared:
     """Load and prepare the scenario of a request.
 
@@ -344,8 +401,19 @@ def prepare_request(request: Request) -> Prepared:
     return prepare(*load_scenario(request.scenario, request.kind), request)
 
 
-def prepare(scenario: Scenario, system: System, request: Request | SimulateOptions) -> Prepared:
+def prepare(
+    scenario: Scenario,
+    system: System,
+    request: Request | SystemOptions,
+    *,
+    is_open: bool = False,
+) -> Prepared:
     """Apply a request to a scenario and its system.
+
+    Args:
+        scenario, system: of the run.
+        request: of the user.
+        is_open: if set, the run need not have a stop time.
 
     Raises:
         InputError: the request cannot be met.
@@ -365,7 +433,8 @@ def prepare(scenario: Scenario, system: System, request: Request | SimulateOptio
         check_events("events", request.events)
         scenario = replace(scenario, events=request.events)
     stop_time = first_given(request.stop_time, scenario.stop_time, system.stop_time)
-    if stop_time is None:
+    is_open &= stop_time is None
+    if stop_time is None and not is_open:
         raise InputError(f"{scenario.name}: has no stop time; set one with --stop-time")
     system = replace(system, steps={**system.steps, **(request.steps or {})})
     step = first_given(request.step, scenario.step, system.step)
@@ -376,14 +445,19 @@ def prepare(scenario: Scenario, system: System, request: Request | SimulateOptio
     coupling = first_given(request.coupling, scenario.coupling)
     if request.strict and coupling is None and order in (None, "feedthrough", "gauss-seidel"):
         coupling = "solve"
-    experiment = Experiment(stop_time, step, order, system.start_time or 0.0, coupling)
+    start_time = system.start_time or 0.0
+    if stop_time is None:
+        stop_time = start_time + _MANY * step
+    experiment = Experiment(stop_time, step, order, start_time, coupling)
     isolation = Isolation.of(request.isolate, request.step_timeout)
-    plan = make_plan(system, experiment, isolation, request.loop)
+    # A program is not a loop of FMUs.
+    loop = request.loop if request.loop in Plan.LOOPS else Plan.LOOPS[0]
+    plan = make_plan(system, experiment, isolation, loop)
     with findings.collecting():
         followed = [target for table in input_tables for target in table.targets]
         events = read_events(scenario.name, scenario.events, replace(system, step=step), followed)
     findings.refuse()
-    return Prepared(scenario, plan, events, input_tables)
+    return Prepared(scenario, plan, events, input_tables, is_open)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:

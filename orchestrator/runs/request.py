@@ -14,7 +14,16 @@ from dataclasses import KW_ONLY, dataclass, field, fields
 from functools import wraps
 from inspect import signature
 from pathlib import Path
-from typing import Any, Literal, ParamSpec, TypeVar, get_args, get_origin, get_type_hints
+from typing import (
+    Any,
+    Concatenate,
+    Literal,
+    ParamSpec,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 
 from fmus.kinds import AUTO, KindName
 from orchestrator.cosim import (
@@ -33,6 +42,7 @@ from orchestrator.machine.texts import literal
 P = ParamSpec("P")
 T = TypeVar("T")
 R = TypeVar("R")
+S = TypeVar("S")
 
 
 def option(
@@ -92,6 +102,21 @@ def takes_keywords(
     stands for their help.
 
     """
+    decorator: Callable[[Callable[[T], R]], Callable[P, R]] = _taking(declared, 0)
+    return decorator
+
+
+def method_takes_keywords(
+    declared: Callable[P, T],
+) -> Callable[[Callable[[S, T], R]], Callable[Concatenate[S, P], R]]:
+    """Let a method of a dataclass take its fields as arguments: see :func:`takes_keywords`."""
+    decorator: Callable[[Callable[[S, T], R]], Callable[Concatenate[S, P], R]]
+    decorator = _taking(declared, 1)
+    return decorator
+
+
+def _taking(declared: Callable[..., Any], before: int) -> Any:
+    """Return a decorator for functions of some arguments and a dataclass."""
     hints, shown = get_type_hints(declared), signature(declared)
     texts = {entry.name: entry.metadata["help"] for entry in fields(declared)}  # type: ignore[arg-type]
     described, parameters = [], []
@@ -101,22 +126,24 @@ def takes_keywords(
         default = {} if repr(parameter.default) == "<factory>" else parameter.default
         parameters.append(parameter.replace(annotation=hints[name], default=default))
 
-    def decorate(function: Callable[[T], R]) -> Callable[P, R]:
+    def decorate(function: Callable[..., Any]) -> Callable[..., Any]:
+        name = function.__qualname__.removesuffix(".__init__")
+        own = [*signature(function).parameters.values()][:before]
         arguments = textwrap.indent("\n".join(described), " " * 8).lstrip()
 
         @wraps(function)
-        def call(*positional: P.args, **keywords: P.kwargs) -> R:
+        def call(*positional: Any, **keywords: Any) -> Any:
             try:
-                shown.bind(*positional, **keywords)
+                shown.bind(*positional[before:], **keywords)
             except TypeError as error:
-                raise TypeError(f"{function.__name__}() {error}") from None
-            return function(declared(*positional, **keywords))
+                raise TypeError(f"{name}() {error}") from None
+            return function(*positional[:before], declared(*positional[before:], **keywords))
 
         call.__doc__ = (function.__doc__ or "").replace("{arguments}", arguments)
         returned = get_type_hints(function)["return"]
         call.__annotations__ = {**hints, "return": returned}
         call.__signature__ = shown.replace(  # type: ignore[attr-defined]
-            parameters=parameters, return_annotation=returned
+            parameters=[*own, *parameters], return_annotation=returned
         )
         return call
 
@@ -238,8 +265,8 @@ class Request(Options):
 
 
 @dataclass(frozen=True)
-class SimulateOptions(Options):
-    """Arguments of :func:`.run.simulate`."""
+class SystemOptions(Options):
+    """A system, and the user's changes, in Python."""
 
     system: str | Path | Mapping[str, Any] | System = field(
         metadata={
@@ -254,8 +281,14 @@ class SimulateOptions(Options):
         "each member",
     )
     _: KW_ONLY
-    progress: bool = option(False, "show a bar on runs that take longer than some seconds")
     variant: str | None = option(None, "name of a system description in an SSP")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SimulateOptions(SystemOptions):
+    """Arguments of :func:`.run.simulate`."""
+
+    progress: bool = option(False, "show a bar on runs that take longer than some seconds")
     checkpoint: str | Path | None = option(
         None,
         "folder for checkpoints, from which another process can continue the run; it is removed "

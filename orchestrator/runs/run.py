@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from functools import partial
@@ -29,7 +29,7 @@ from orchestrator.figures.run_figures import figure_files
 from orchestrator.figures.style import Drawn
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.disk import file_name, process_folder
-from orchestrator.machine.errors import Findings, InputError, reason
+from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.texts import matches, matching
 from orchestrator.runs.folder import (
@@ -44,10 +44,7 @@ from orchestrator.runs.folder import (
 )
 from orchestrator.runs.preparation import (
     Prepared,
-    check_brings_its_own,
-    load_scenario,
-    prepare,
-    warn_of,
+    prepare_options,
 )
 from orchestrator.runs.progress import Progress
 from orchestrator.runs.request import (
@@ -56,7 +53,6 @@ from orchestrator.runs.request import (
     takes_keywords,
 )
 from orchestrator.runs.result import FILES, Result, Stopwatch, write_record
-from orchestrator.runs.scenario import Scenario
 from orchestrator.vehicle.cautions import Watch, cautions, cautions_beside, values_of
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
@@ -68,9 +64,6 @@ CHECKPOINTS = "checkpoint"
 #: A file that reserves room for the files written last, so that a full disk does not cost the
 #: record.
 _SPARE, _SPARE_BYTES = ".spare", 65536
-
-#: The caller of :func:`simulate`, seen from where it warns: the decorator adds a level.
-_STACK_LEVEL = 4
 
 #: Exit status of a process that a run has to end.
 _FAILED = 1
@@ -98,23 +91,8 @@ def simulate(options: SimulateOptions) -> Result:
         KeyboardInterrupt: Ctrl-C, after the current step.
 
     """
-    system, findings = options.system, Findings(options.strict)
-    if isinstance(system, System):
-        check_brings_its_own(str(system), options.kind)
-        if options.variant is not None:
-            raise InputError(f"{system}: has no variants; give it to load")
-        scenario = Scenario(system.name)
-    else:
-        scenario, system = load_scenario(
-            system, options.kind, variant=options.variant, findings=findings
-        )
-        findings.refuse()
-    if not isinstance(options.parameters, Mapping | None):
-        raise InputError(
-            f"parameters: a mapping by component.parameter, not {options.parameters!r}"
-        )
-    prepared = prepare(scenario, system, options)
-    warn_of(findings, [] if options.system is system else prepared.doubts(), _STACK_LEVEL)
+    prepared = prepare_options(options)
+    scenario = prepared.scenario
     result = Result(scenario, prepared.loops, prepared)
     observers: list[Observer] = [result, *([Progress(scenario.name)] * options.progress)]
     with _checkpoints_for(prepared, options) as all_checkpoints:

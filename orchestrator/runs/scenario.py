@@ -555,13 +555,13 @@ def _ports(
     return [port]
 
 
-def _routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Mapped) | None]]:
+def routes(system: System, port: PortName) -> list[tuple[PortName, (Linear | Mapped) | None]]:
     """Return the inputs that a port feeds, each with its transformation; an input feeds itself."""
     if system.variable(port).causality == "input":
         return [(port, None)]
     routes = [(c.target, c.transformation) for c in system.connections if c.source == port]
     if not routes:
-        raise InputError(f"{port} feeds nothing here: an event would change nothing")
+        raise InputError(f"{port} feeds nothing here: to change it would have no effect")
     return routes
 
 
@@ -571,7 +571,7 @@ def _inputs(names: Any, system: System) -> tuple[PortName, ...]:
         target
         for name in _targets(names)
         for port in _ports(system, name, ("input", "output"))
-        for target, _ in _routes(system, port)
+        for target, _ in routes(system, port)
     )
 
 
@@ -592,7 +592,7 @@ def _altered(
     altered = []
     for name, value in flatten(values):
         for port, each in _members(name, value, _ports(system, name, ("input", "output"))):
-            for target, change in _routes(system, port):
+            for target, change in routes(system, port):
                 arrived = arriving(system, port, each, change)
                 if isinstance(arrived, float) and not isfinite(arrived):
                     raise InputError(

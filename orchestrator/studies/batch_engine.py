@@ -29,6 +29,7 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
+from orchestrator.program.session import PROGRAM
 from orchestrator.program.writer import Text, indices_of
 from orchestrator.studies.engine import Outcome, Point, kinds_of
 from orchestrator.studies.own_indices import OwnIndex
@@ -349,15 +350,9 @@ class BatchEngine:
         if compiled.program.run(values, experiment, rows) is None:
             raise InputError(f"{point.scenario}: a component has refused")
         system = programs.system.with_parameters(point.parameters)
-        parameters = {
-            name: variable.shown(system.value(name))
-            for component in system.components.values()
-            for variable in component.having("parameter")
-            for name in (PortName(component.name, variable.name),)
-        }
-        return Table.of(
-            Header(tuple(compiled.source.columns), experiment, parameters), rows, Ending(None)
-        )
+        columns = [*map(PortName.read, compiled.source.columns)]
+        header = Header.of(system, experiment, columns, PROGRAM)
+        return Table.of(header, rows, Ending())
 
 
 _experiments: Callable[..., Experiment] = lru_cache(Experiment)

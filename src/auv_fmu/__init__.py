@@ -4,8 +4,9 @@
     result = simulate("fig4", {"plant.noise.std": 0.0})
     result.plot("plant.eta.*")
 
-`simulate`, `load`, `read`, `sweep` and `Result` come from :mod:`orchestrator`, imported on first
-use. The subpackages below hold the equations, one module per subject.
+`simulate`, `Simulation`, `Simulations`, `load`, `read`, `sweep` and `Result` come from
+:mod:`orchestrator`, imported on first use. The subpackages below hold the equations, one module per
+subject.
 
 The paper is "Three-dimensional tracking control of autonomous underwater vehicles with
 limited torque and without velocity sensors". Equation numbers in this package are its own.
@@ -45,13 +46,25 @@ from auv_fmu.language.linear_algebra import interpolate, solve
 from auv_fmu.language.variable import POSITIVE, Refusal, Variable
 
 if TYPE_CHECKING:
-    from orchestrator import Result, load, read, simulate, sweep
+    from orchestrator import (
+        Result,
+        Simulation,
+        SimulationFailed,
+        Simulations,
+        load,
+        read,
+        simulate,
+        sweep,
+    )  # fmt: skip
 
 __all__ = ["POSITIVE", "Matrix", "Refusal", "Variable", "Vector", "interpolate", "solve"]
 
 # The copy of this package in an FMU has another name, and only the equations.
 if __name__ == "auv_fmu":
-    __all__ += ["Result", "load", "read", "simulate", "sweep"]
+    __all__ += [
+        "Result", "Simulation", "SimulationFailed", "Simulations", "load", "read", "simulate",
+        "sweep",
+    ]  # fmt: skip
 
 __version__ = "0.1.0"
 

@@ -32,8 +32,8 @@ from support.tiers import slow
 pytestmark = pytest.mark.usefixtures("workplace")
 
 (
-    ACCURACY, BATCH, EVENTS, EXAMPLES, LIBCOSIM, PARAMETERS, PYTHON, SCENARIOS, STUDIES, TEST_ONE,
-    TRAJECTORIES,
+    ACCURACY, BATCH, EVENTS, EXAMPLES, LIBCOSIM, PARAMETERS, PYTHON, SCENARIOS, STEP, STUDIES,
+    TEST_ONE, TRAJECTORIES,
 ) = (
     DOCS / f"{name}.md"
     for name in (
@@ -45,6 +45,7 @@ pytestmark = pytest.mark.usefixtures("workplace")
         "how-to/change-parameters",
         "how-to/python",
         "reference/scenario-files",
+        "how-to/step",
         "how-to/studies",
         "how-to/test-one-component",
         "how-to/trajectories",
@@ -148,16 +149,26 @@ def test_tests_that_the_page_names_are_there():
         assert (DOCS.parent / path).exists(), path
 
 
-@needs("parquet, and pandas", "pandas", "pyarrow")
-def test_examples_in_python_print_what_the_page_says(workplace, capsys):
+def prints_what_it_says(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Execute the examples of a page, one after the other."""
     names: dict[str, object] = {}
     printed = ""
-    for language, text in blocks(PYTHON, "python", "text"):
+    for language, text in blocks(page, "python", "text"):
         if language == "text":
             assert printed == text
             continue
-        exec(compile(text, "docs/how-to/python.md", "exec"), names)
+        exec(compile(text, str(page), "exec"), names)
         printed = capsys.readouterr().out
+
+
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_simulations_stepped_on_the_page_print_what_it_says(capsys):
+    prints_what_it_says(STEP, capsys)
+
+
+@needs("parquet, and pandas", "pandas", "pyarrow")
+def test_examples_in_python_print_what_the_page_says(workplace, capsys):
+    prints_what_it_says(PYTHON, capsys)
     assert Path("commands.png").is_file()
     files = contents(workplace / "results/mine").keys()
     assert files == {"result.parquet", "metrics.json", "run.json"}

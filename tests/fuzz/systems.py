@@ -276,7 +276,7 @@ class Ways:
     def programs(self, drawn: Drawn, number: int) -> Iterator[tuple[str, Text, Path]]:
         """Programs of a system, each with the name of the way in which it was made."""
         plan, place = drawn.plan(NATIVE), self._folder / f"{number}"
-        text = Text(plan, drawn.definitions, alters=True, shared=self._shared)
+        text = Text(plan, drawn.definitions, has_events=True, shared=self._shared)
         options = "-DAPART=", self._object, "-shared"
         yield "alters", text, compiled(text.apart(), place.with_suffix(".a.so"), *options)
         is_quick = number % 2 == 1

@@ -97,7 +97,7 @@ def play(
                 simulation, ahead, until, _pointer(rows), parameters, len(events),
                 *map(_pointer, (events, actions, happened)),
             )
-            if text.alters
+            if text.has_events
             else library.run(simulation, until, _pointer(rows))
         )  # fmt: skip
     library.failure(simulation, reason)

@@ -47,7 +47,7 @@ from orchestrator.cosim.fmi.instance import (
 )
 from orchestrator.cosim.fmi.loaded import load_instance
 from orchestrator.cosim.fmi.surroundings import Surroundings
-from orchestrator.cosim.row import Row, ports_of_type
+from orchestrator.cosim.row import Row
 from orchestrator.cosim.stages import member, step_members
 from orchestrator.cosim.system import System
 from orchestrator.cosim.variables import TYPES, Standing, StringTable, Value, are_of
@@ -137,7 +137,7 @@ def place_instances(
     components: Mapping[str, Component],
     log: Log,
     isolation: Isolation | None,
-    interrupts: Interrupts,
+    interrupts: Callable[[], Interrupts],
 ) -> Iterator[dict[str, Instance]]:
     """Provide instances of components, by name: all in this process, or each in a separate one.
 
@@ -147,7 +147,7 @@ def place_instances(
         components: by name.
         log: takes the messages of the FMUs.
         isolation: settings of separate processes; None: instances are in this process.
-        interrupts: end the wait for an FMU.
+        interrupts: give the present signals to stop, which end the wait for an FMU.
 
     Raises:
         InputError: an FMU cannot be loaded.
@@ -190,7 +190,10 @@ def _has_room(component: Component) -> Iterator[bool]:
 
 @contextmanager
 def isolate_instances(
-    components: Mapping[str, Component], log: Log, isolation: Isolation, interrupts: Interrupts
+    components: Mapping[str, Component],
+    log: Log,
+    isolation: Isolation,
+    interrupts: Callable[[], Interrupts],
 ) -> Iterator[dict[str, Instance]]:
     """Provide instances, each in a separate process that ends with the context.
 
@@ -405,7 +408,7 @@ class IsolatedInstance:
         status: Callable[[float], int | None],
         log: Log,
         timeout: float,
-        interrupts: Interrupts,
+        interrupts: Callable[[], Interrupts],
     ) -> None:
         """Use a process that is about to instantiate a component.
 
@@ -415,7 +418,7 @@ class IsolatedInstance:
             status: waits some seconds for the exit status of the process.
             log: takes the messages of the FMU.
             timeout: limit of a call [s].
-            interrupts: end the wait for a call.
+            interrupts: give the present signals to stop, which end the wait for a call.
 
         """
         self.name, self._component = component.name, component
@@ -619,7 +622,7 @@ class IsolatedInstance:
     def _waited(self, seconds: float) -> None:
         # A child of a process that has ended may keep the connection open.
         self._status(0.0)
-        if self._interrupts and seconds >= _PATIENCE:
+        if self._interrupts() and seconds >= _PATIENCE:
             self._hangs = True
             raise KeyboardInterrupt
         limit = _START if self._call == "start" else self._timeout
@@ -678,7 +681,7 @@ class _Ports:
         self._standing: list[tuple[int, ModelVariable, Standing]] = []
         n = 0
         for name, own in TYPES.items():
-            ports = ports_of_type(component, causality, name)
+            ports = component.having(causality, name)
             if ports and own.family != "Real":
                 self._typed.append((name, slice(n, n + len(ports))))
             if own.stands:

@@ -546,6 +546,8 @@ class LoadedInstance:
 
     def tie(self, values: np.ndarray, parts: Sequence[Part], strings: StringTable) -> None:
         """Tie the instance to its values in the row."""
+        for calls in (self._inputs, self._outputs, self.set_inputs, self.get_outputs):
+            calls.clear()
         for part in parts:
             moved = self._fmu.moved(part.fmi_type)
             row = values[part.place]

@@ -54,7 +54,7 @@ def check(run: Prepared, folder: Path) -> None:
     """Compare the program of a run with its FMUs."""
     table = Table()
     ending = run.run([table])
-    text = Text(run.plan, definitions_of(run.plan.system), alters=True)
+    text = Text(run.plan, definitions_of(run.plan.system), has_events=True)
     path = compiled(text.text(), folder / "program.so", "-shared")
     happened = np.zeros(1 + len(run.events) * MOST_LISTED * LISTED)
     found = play(text, path, *numbers_of(text, run.events), happened)
