@@ -7,6 +7,7 @@ import weakref
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
+from pathlib import Path
 from typing import Any, Literal, NamedTuple, TypeAlias, cast, get_args
 
 import numpy as np
@@ -49,7 +50,7 @@ class SimulationOptions(SystemOptions):
         "auto",
         "stepping loop: program (the system as one compiled program, of components in the language "
         "of equations), compiled (FMUs, loop in C) or python (FMUs), with the same numbers; "
-        "default: auto (the first that is available)",
+        "default: auto (the first that is available; for the file of an FMU, the FMU)",
     )
     keep: bool = option(True, "keep a row for each step, for `result`")
 
@@ -241,7 +242,9 @@ class Simulation:
         prepared, options = self._prepared, self._options
         observers = [self._rows] if options.keep else []
         why = None
-        if options.loop in ("auto", PROGRAM):
+        # Who names the file of an FMU means this file.
+        is_fmu = isinstance(options.system, str | Path) and Path(options.system).suffix == ".fmu"
+        if options.loop == PROGRAM or (options.loop == "auto" and not is_fmu):
             if prepared.events or prepared.input_tables:
                 why = "it has no events and tables of inputs"
             elif options.isolate or options.kind == PYTHON:
