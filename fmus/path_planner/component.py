@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu import Refusal, Variable, __author__, __citation__, __license__, __version__
-from auv_fmu.guidance import path_planner
+from auv_fmu.guidance import follower, path_planner
 from auv_fmu.guidance.path_planner import Parameters, PathState
 from auv_fmu.language.quantities import ETA_WITHOUT_ROLL
 from auv_fmu.language.vectors import Vector5
@@ -41,7 +41,7 @@ def outputs(parameters: Parameters, state: PathState) -> Outputs:
     waypoints = parameters.waypoints
     wanted = path_planner.reference(waypoints, state.ahead, state.t)
     along = path_planner.course(waypoints, state.ahead, wanted.dy_d)
-    return Outputs(wanted, path_planner.posture(wanted.y_d, along, parameters.ell))
+    return Outputs(wanted, follower.posture(wanted.y_d, along, parameters.follower.ell))
 
 
 def check_state(parameters: Parameters, state: PathState) -> None:

@@ -103,10 +103,11 @@ def add_new(parser: argparse.ArgumentParser) -> None:
     )
     start.add_argument(
         "--from",
-        dest="network",
+        dest="source",
         type=Path,
         metavar="FILE",
-        help="start from the neural network of dense layers in an .onnx or .npz file",
+        help="start from the neural network of dense layers in an .onnx or .npz file, or from a "
+        "planner that follows the track in a .csv file",
     )
     component.set_defaults(action=_component)
     controller = kinds.add_parser(
@@ -210,7 +211,7 @@ def _controller(options: argparse.Namespace) -> int:
 
 
 def _component(options: argparse.Namespace) -> int:
-    return _next_steps(new_component(options.name, options.folder, options.like, options.network))
+    return _next_steps(new_component(options.name, options.folder, options.like, options.source))
 
 
 def _next_steps(files: list[Path]) -> int:

@@ -16,9 +16,9 @@ from orchestrator.cosim import Component, check_binary, read_component
 from orchestrator.machine.children import run_module
 from orchestrator.machine.errors import Findings, InputError, last_line, reason
 from orchestrator.machine.user_files import unpack
+from orchestrator.program.components import refusals
 from orchestrator.runs.preparation import FALLBACK_STOP_TIME, load_scenario, outdated, prepare
 from orchestrator.runs.request import Request
-from orchestrator.runs.scenario import impossible_paths
 
 #: Surprises for the user of an FMU, by a flag of its description and its surprising value.
 _SURPRISES = {
@@ -151,7 +151,7 @@ def _system(options: argparse.Namespace, findings: Findings) -> list[str]:
             remarks.append("has no stop time: a run needs --stop-time")
             request = Request(stop_time=(system.start_time or 0.0) + FALLBACK_STOP_TIME)
         prepared = prepare(scenario, system, request)
-        for text in impossible_paths(prepared.system):
+        for text in refusals(prepared.system):
             findings.problem(text)
         remarks += [
             f"{', '.join(ring)}: a ring of direct feedthroughs, which is solved if the FMUs "

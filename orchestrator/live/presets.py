@@ -253,7 +253,7 @@ def _check(prepared: Prepared) -> None:
     lacking = {
         "rings of direct feedthroughs": plan.rings,
         "linear inputs": experiment.coupling == "linear",
-        "a table of inputs": prepared.input_table is not None,
+        "a table of inputs": prepared.input_tables,
         "a start time other than 0": experiment.start_time != 0.0,
         f"a system without the {loops[0].vehicle}": loops[0].vehicle not in system.components,
         f"more than {_MOST_VEHICLES} vehicles": len(loops) > _MOST_VEHICLES,

@@ -172,6 +172,8 @@ def _place(table: type[TomlTable], error: ErrorDetails) -> _Place:
         step: tuple[str | int, ...] = (key,)
         if inner is not None and annotation is not inner and parts:
             member = parts.pop(0)
+            if str(member).startswith("list[") and parts:
+                member = parts.pop(0)
             if isinstance(member, int):
                 step = (key, member)
             elif member != inner.__name__:

@@ -9,7 +9,7 @@ from fnmatch import fnmatchcase
 from math import isfinite
 from typing import Any
 
-from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.errors import InputError, did_you_mean, escape_unprintable
 
 #: Truth values, as XML writes them.
 BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
@@ -39,6 +39,12 @@ def finite(text: str, where: str) -> float:
     if not isfinite(number):
         raise ValueError(f"{where} {text[:40]!r} is not finite")
     return number
+
+
+def in_docstring(name: str) -> str:
+    """Escape the name of a file for a docstring, in backticks."""
+    shown = escape_unprintable(name).replace("`", "'")
+    return shown.replace("\\", r"\\").replace('"', r"\"")
 
 
 def whole(text: str, where: str) -> int:

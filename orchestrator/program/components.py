@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import importlib
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from fmus.discovery import ORIGIN, Origin, components, digest_at, name_of, origin_of, source_of
 from fmus.kinds import NATIVE, PYTHON
@@ -51,6 +53,21 @@ def definitions_of(system: System) -> dict[str, Definition]:
                 raise InputError(f"{name}: {error}") from None
         definitions[name] = known[component.digest]
     return definitions
+
+
+def refusals(system: System) -> Iterator[str]:
+    """Find parameters that components of known source will refuse, without running them."""
+    for name, component in system.components.items():
+        try:
+            definition = _definition(component)
+        except (InputError, Misdeclared, Untranslatable):
+            continue
+        if check := definition.behaviour.hooks["check"]:
+            values: dict[str, Any] = {**component.starts, **system.parameters_of(name)}
+            try:
+                check(definition.parameters.of(values))
+            except Exception as error:
+                yield f"{name}: {error}"
 
 
 def _definition(component: Component) -> Definition:

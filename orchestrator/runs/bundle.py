@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import shutil
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, partial
 from hashlib import sha256
 from pathlib import Path
@@ -167,15 +167,24 @@ def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
         return _best_fmus(fmi)
     if kind not in KINDS:
         raise InputError(f"kind {kind!r}: use one of {', '.join((AUTO, *KINDS))}")
-    build = partial(_built, "--kind", kind, "--fmi", fmi)
+    files = kept_fmus(key_of(kind, fmi), partial(_built, "--kind", kind, "--fmi", fmi))
+    return next(iter(files.values())).parent
+
+
+def kept_fmus(key: str, build: Callable[[], Mapping[str, bytes]]) -> dict[str, Path]:
+    """Return the FMUs in the user's cache folder with a key, by name; `build` makes missing ones.
+
+    Raises:
+        InputError: they cannot be built, or the cache folder cannot be written.
+
+    """
     try:
-        files = made_once(CATEGORY, key_of(kind, fmi), build)
+        return made_once(CATEGORY, key, build)
     except OSError as error:
         raise InputError(
             f"cannot keep FMUs in {users_folder()}: {reason(error)}; set XDG_CACHE_HOME to a "
             "writable folder"
         ) from error
-    return next(iter(files.values())).parent
 
 
 def _best_fmus(fmi: str) -> Path:

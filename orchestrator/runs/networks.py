@@ -23,7 +23,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmus.ports.port import FAULT, H_MAX, TIME
-from orchestrator.machine.errors import InputError, escape_unprintable, reason
+from orchestrator.machine.errors import InputError, reason
+from orchestrator.machine.texts import in_docstring
 
 #: Activations of a sum z, in the language of equations; {} stands for a number.
 _ACTIVATIONS = {
@@ -619,7 +620,7 @@ def component_text(name: str, network: Network, source: str) -> str:
     imports = [f"from math import {', '.join(names)}"] if names else []
     head = [
         f'"""{name}: a neural network of dense layers, {" - ".join(map(str, sizes))}.\n\n'
-        f"Made from `{_in_docstring(source)}` by `auv-fmu new component --from`, with its weights "
+        f"Made from `{in_docstring(source)}` by `auv-fmu new component --from`, with its weights "
         "written out.\n"
         '"""',
         "from __future__ import annotations",
@@ -637,12 +638,6 @@ def component_text(name: str, network: Network, source: str) -> str:
         network_text,
     ]
     return "\n\n\n".join(["\n\n".join(head), *body]) + "\n"
-
-
-def _in_docstring(name: str) -> str:
-    """Escape the name of a file for a docstring, in backticks."""
-    shown = escape_unprintable(name).replace("`", "'")
-    return shown.replace("\\", r"\\").replace('"', r"\"")
 
 
 def _port(name: str, otherwise: str) -> str:

@@ -75,7 +75,7 @@ def new_component(
     name: str,
     folder: Path | None = None,
     like: str = LIKENESSES[0],
-    network: Path | None = None,
+    source: Path | None = None,
 ) -> list[Path]:
     """Create a folder with a component, whose file becomes both kinds of FMU.
 
@@ -83,27 +83,32 @@ def new_component(
         name: of the component, `WaterTank` or `water_tank`.
         folder: made if it does not exist; None: one with the name of its module.
         like: one of :data:`LIKENESSES`.
-        network: file of a neural network that it computes instead.
+        source: file of a neural network that it computes instead, or of a track that it follows.
 
     Returns:
         The component, its tests, the scenario and the README.
 
     Raises:
         InputError: the name is not usable, the folder is not empty or cannot be written, or the
-            network cannot be read.
+            source cannot be read.
 
     """
     module, _ = _names(name, "component")
     names = {"OwnComponent": name_of(module), "own_component": module}
-    if network is None:
+    if source is None:
         text = _template(f"component/{like}.py.txt")
         setting, output = _EXAMPLES[like]
+    elif source.suffix == ".csv":
+        # Only tracks and networks need numpy.
+        from orchestrator.runs.tracks import planner_text, read_track  # noqa: PLC0415
+
+        like, setting, output = "track", "speed_max=2", "y_d.x"
+        text = planner_text(name_of(module), read_track(source), source.name)
     else:
-        # Only this needs numpy.
         from orchestrator.runs.networks import component_text, read_network  # noqa: PLC0415
 
-        like, layers = "network", read_network(network)
-        text = component_text(name_of(module), layers, network.name)
+        like, layers = "network", read_network(source)
+        text = component_text(name_of(module), layers, source.name)
         names["own_input"] = layers.input_port
         setting, output = f"'{layers.input_port}[1]=0.5'", f"{layers.output_port}[1]"
     texts = {

@@ -56,6 +56,7 @@ from orchestrator.runs.scenario import (
     scenario_of,
     shared_events,
 )
+from orchestrator.runs.tracks import with_planners
 from orchestrator.runs.wiring import check_built, closed_loop, read_wiring
 from orchestrator.vehicle.cautions import differing_vehicle
 from orchestrator.vehicle.signals import Loop, loops_of
@@ -154,7 +155,8 @@ def load_scenario(
     if path is None or read is None:
         scenario = scenario_of(name) if isinstance(name, Mapping) else read_scenario(str(name))
         check_figure(scenario.figure)
-        system = closed_loop(current_fmus(kind, fmi), scenario)
+        folder = current_fmus(kind, fmi)
+        system = closed_loop(folder, with_planners(scenario, folder, kind))
         scenario = replace(scenario, parameters=system.expanded(scenario.parameters))
     else:
         check_brings_its_own(str(name), kind, fmi)
@@ -247,7 +249,7 @@ def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> No
 
 def left_behind(scenario: Scenario) -> str | None:
     """Warn of parts of a scenario that are lost if only its system is kept."""
-    has = {"events": bool(scenario.events), "inputs": scenario.inputs is not None}
+    has = {"events": bool(scenario.events), "inputs": bool(scenario.inputs)}
     if not any(has.values()):
         return None
     lost = " and ".join(name for name, there in has.items() if there)
@@ -282,7 +284,7 @@ class Prepared:
         scenario: as its file has it, except for events and inputs of the request.
         plan: the system, and its steps.
         events: of the run.
-        input_table: values of inputs over time; None: inputs keep their values.
+        input_tables: values of inputs over time; other inputs keep their values.
         is_open: if set, nothing says when the run ends.
 
     """
@@ -290,7 +292,7 @@ class Prepared:
     scenario: Scenario
     plan: Plan
     events: tuple[Event, ...] = ()
-    input_table: InputTable | None = None
+    input_tables: tuple[InputTable, ...] = ()
     is_open: bool = False
 
     @property
@@ -316,11 +318,11 @@ class Prepared:
     @property
     def identity(self) -> Identity:
         """Everything that decides its rows."""
-        inputs = self.input_table.digest if self.input_table else ""
-        return self.plan.identity(self.events, inputs)
+        inputs = (table.digest for table in self.input_tables)
+        return self.plan.identity(self.events, " ".join(inputs))
 
     def run(self, observers: Sequence[Observer], hooks: Sequence[Hook] = ()) -> Ending:
-        """Make the run; `hooks` act before its table of inputs and its events do.
+        """Make the run; `hooks` act before its tables of inputs and its events do.
 
         Raises:
             InputError: an FMU or a parameter is not usable; nothing was stepped.
@@ -329,8 +331,8 @@ class Prepared:
         return simulate_plan(self.plan, observers, [*hooks, *self.hooks()])
 
     def hooks(self) -> list[Hook]:
-        """Return hooks for its table of inputs and its events."""
-        hooks: list[Hook] = [] if self.input_table is None else [self.input_table.playback()]
+        """Return hooks for its tables of inputs and its events."""
+        hooks: list[Hook] = [table.playback() for table in self.input_tables]
         return hooks + ([Events(self.events)] if self.events else [])
 
     def with_parameters(self, values: Mapping[str, object]) -> Prepared:
@@ -345,7 +347,7 @@ class Prepared:
 
     def doubts(self) -> list[str]:
         """Warn of possible omissions: inputs without a source, parameters of a vehicle."""
-        given = {*(self.input_table.targets if self.input_table else ())}
+        given = {target for table in self.input_tables for target in table.targets}
         for action in (event.action for event in self.events):
             values = action.values if isinstance(action, Alter) else ()
             values = action.inputs if isinstance(action, Set) else values
@@ -420,12 +422,11 @@ def prepare(
     findings, values = Findings(request.strict), system.expanded(request.parameters or {})
     system = system.with_parameters(values)
     if request.inputs is not None:
-        scenario = replace(scenario, inputs=Inputs(Path(request.inputs), wins=True))
-    input_table = None
-    if scenario.inputs is not None:
-        given = {*values} if scenario.inputs.wins else {*values, *scenario.parameters}
-        with findings.collecting():
-            system, input_table = read_inputs(scenario.inputs, system, given)
+        files = [request.inputs] if isinstance(request.inputs, str | Path) else request.inputs
+        scenario = replace(scenario, inputs=[Inputs(Path(file), wins=True) for file in files])
+    input_tables: tuple[InputTable, ...] = ()
+    with findings.collecting():
+        system, input_tables = read_inputs(scenario.inputs, system, values, scenario.parameters)
     if isinstance(request.events, str):
         scenario = replace(scenario, events=read_scenario(request.events).events)
     elif request.events is not None:
@@ -453,10 +454,10 @@ def prepare(
     loop = Plan.LOOPS[0] if request.loop == PROGRAM else request.loop
     plan = make_plan(system, experiment, isolation, loop)
     with findings.collecting():
-        followed = input_table.targets if input_table else ()
+        followed = [target for table in input_tables for target in table.targets]
         events = read_events(scenario.name, scenario.events, replace(system, step=step), followed)
     findings.refuse()
-    return Prepared(scenario, plan, events, input_table, is_open)
+    return Prepared(scenario, plan, events, input_tables, is_open)
 
 
 def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
@@ -489,7 +490,8 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         only=scenario.only and [*scenario.only, *difference.components],
         parameters={},
     )
-    system = closed_loop(current_fmus(request.kind), companion)
+    folder = current_fmus(request.kind)
+    system = closed_loop(folder, with_planners(companion, folder, request.kind))
     fed = {connection.target for connection in system.connections}
 
     def shared(values: Mapping[PortName, Any]) -> dict[PortName, Any]:

@@ -203,9 +203,12 @@ class Options:
         is_hashed=False,
         metavar="SCENARIO|FILE.toml",
     )
-    inputs: str | Path | None = option(
+    inputs: str | Path | Sequence[str | Path] | None = option(
         None,
-        "table (CSV or Parquet) of unconnected inputs over time; default: the scenario's own",
+        "table (CSV or Parquet) of unconnected inputs over time, or, repeated, several (in Python, "
+        "a list); default: the scenario's own",
+        is_hashed=False,
+        action="append",
     )
     loop: Plan.Loop = option(Plan.LOOPS[0], LOOP)
     isolate: bool = option(
@@ -250,6 +253,10 @@ class Request(Options):
             if name == "events" and not isinstance(value, str):
                 # The option takes the name of a scenario, not tables.
                 rest[name] = ", ".join(map(str, value)) or "none"
+                continue
+            if how.get("action") == "append":
+                each = [value] if isinstance(value, str | Path) else value
+                words += [word for file in each for word in (flag, _text(file))]
                 continue
             words.append(flag)
             if how.get("action") != "store_true":

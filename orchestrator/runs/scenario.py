@@ -19,10 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from auv_fmu.guidance import path_planner
-from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints
-from auv_fmu.paper.actuators import Limits
-from auv_fmu.paper.vehicle import Vehicle
+from auv_fmu.guidance.path_planner import MOST
 from orchestrator.cosim import (
     Alter,
     Condition,
@@ -50,7 +47,7 @@ from orchestrator.machine.texts import finite, flatten, literal
 from orchestrator.machine.user_files import explain_errors, read_text
 from orchestrator.runs import SCENARIOS_FOLDER, find_toml, names_in
 from orchestrator.runs.tables import read_columns, read_rows, records
-from orchestrator.vehicle.signals import ACTUATORS, STANDARD
+from orchestrator.vehicle.signals import STANDARD
 
 #: Messages for files that cannot be read.
 _NOT_A_SCENARIO, _NO_INPUTS = "not a scenario", "not a table of inputs"
@@ -197,7 +194,7 @@ class Scenario:
     parameters: Mapping[PortName, Any] = field(default_factory=dict)
     ours: Mapping[str, str] = field(default_factory=dict)
     events: Sequence[Mapping[str, Any]] = ()
-    inputs: Inputs | None = None
+    inputs: Sequence[Inputs] = ()
     digest: str = ""
 
     @property
@@ -273,8 +270,11 @@ def _scenario(path: Path, content: dict[str, Any], text: str) -> Scenario:
             raise InputError(f"{path}: {name} is already given by {waypoints['file']}")
         content["parameters"] |= parameters
     if "inputs" in content:
-        table = content["inputs"]
-        content["inputs"] = Inputs(**table | {"file": path.parent / table["file"]})
+        tables = content["inputs"]
+        content["inputs"] = [
+            Inputs(**table | {"file": path.parent / table["file"]})
+            for table in (tables if isinstance(tables, list) else [tables])
+        ]
     content["ours"] = {key: str(why) for key, why in flatten(content.get("ours", {}))}
     return Scenario(path.stem, digest=hashlib.sha256(text.encode()).hexdigest(), **content)
 
@@ -288,27 +288,46 @@ def _read_system(content: dict[str, Any], folder: Path, vehicles: int | None) ->
     for key in content.keys() & {"components", "wires", "steps"}:
         content[key] = for_each_vehicle(vehicles, content[key])
     content["components"] = {
-        component: str(folder / fmu) if str(fmu).endswith(".fmu") else fmu
+        component: str(folder / fmu) if str(fmu).endswith((".fmu", ".csv")) else fmu
         for component, fmu in content.get("components", {}).items()
     }
 
 
 def read_inputs(
-    inputs: Inputs, system: System, given: Collection[PortName]
-) -> tuple[System, InputTable]:
-    """Read a table of inputs for :func:`with_input_table`.
+    inputs: Sequence[Inputs],
+    system: System,
+    given: Collection[PortName],
+    stated: Collection[PortName] = (),
+) -> tuple[System, tuple[InputTable, ...]]:
+    """Read tables of inputs for :func:`with_input_table`.
+
+    Args:
+        inputs: the tables.
+        system: with the inputs.
+        given: ports whose values come from the command line; no table may name them.
+        stated: ports whose values come from the scenario; only tables that win may name them.
 
     Raises:
-        InputError: the table cannot be read, or a column is not an available input.
+        InputError: a table cannot be read, or a column is not an available input, or is in another
+            table, too.
 
     """
-    columns = inputs.names
-    with _in_file(inputs.file):
-        targets = [system.named(PortName.read(name)) for name in columns]
-        variables = [system.variable(target) for target in targets]
-    times, *values = inputs.columns(variables)
-    with _in_file(inputs.file):
-        return with_input_table(system, targets, times, values, given, inputs.between)
+    tables, files = [], dict[PortName, Path]()
+    for each in inputs:
+        columns = each.names
+        with _in_file(each.file):
+            targets = [system.named(PortName.read(name)) for name in columns]
+            variables = [system.variable(target) for target in targets]
+            for target in targets:
+                if target in files:
+                    raise InputError(f"{target} is a column of {files[target]}, too")
+        files |= dict.fromkeys(targets, each.file)
+        times, *values = each.columns(variables)
+        taken = given if each.wins else [*given, *stated]
+        with _in_file(each.file):
+            system, table = with_input_table(system, targets, times, values, taken, each.between)
+        tables.append(table)
+    return system, tuple(tables)
 
 
 @contextmanager
@@ -402,8 +421,8 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
         ]
         if not 2 <= len(waypoints) <= MOST:
             raise ValueError(
-                f"it has {len(waypoints)} waypoints, and a path has 2 to {MOST}; for more, write a "
-                "planner (docs/how-to/trajectories.md)"
+                f"it has {len(waypoints)} waypoints, and a path has 2 to {MOST}; with a column t, "
+                f'longer tables are tracks: planner = "{path.name}" under [components]'
             )
     values: dict[str, Any] = {"count": len(waypoints), "timed": "t" in names}
     for number, waypoint in enumerate(waypoints, start=1):
@@ -413,37 +432,6 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
 
 def _are_of_waypoints(names: Sequence[str]) -> bool:
     return sorted(name.strip().lower() for name in names) in (_PLACE, _TIMED)
-
-
-def impossible_paths(system: System) -> Iterator[str]:
-    """Find paths that PathPlanners of a system will refuse, without running them."""
-    for name, component in system.components.items():
-        if component.description.modelName != "PathPlanner":
-            continue
-        try:
-            path_planner.check(_planned({**component.starts, **system.parameters_of(name)}))
-        except KeyError:
-            # Another model of that name.
-            continue
-        except ArithmeticError as error:
-            yield f"{name}: {error}"
-
-
-def _planned(values: Mapping[str, Any]) -> Parameters:
-    """Convert the values of a PathPlanner to the parameters of its equations."""
-    x, y, z, t = (
-        tuple(values[f"waypoint[{k}].{axis}"] for k in range(1, 1 + MOST)) for axis in "xyzt"
-    )
-    timed, cruise, rounding = (values[name] for name in ("timed", "cruise", "rounding"))
-    limits = (tuple(values[f"{end}.{name}"] for name in ACTUATORS) for end in Limits._fields)
-    return Parameters(
-        Waypoints(values["count"], x, y, z, t, timed, cruise, rounding),
-        Vehicle(*(values[name.replace("_", ".")] for name in Vehicle._fields)),
-        values["ell"],
-        Limits(*limits),
-        values["speed_max"],
-        values["turn_max"],
-    )
 
 
 # Events

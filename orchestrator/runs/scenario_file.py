@@ -35,7 +35,7 @@ class PathTable(TomlTable):
 
 
 class InputsTable(TomlTable):
-    """Inputs over time, from a table: `[inputs]`."""
+    """Inputs over time, from a table: `[inputs]`, or one of several: `[[inputs]]`."""
 
     file: str = needed(
         "A table in CSV or Parquet, its path relative to this file: `time` [s] first, then inputs "
@@ -163,7 +163,9 @@ class ScenarioFile(TomlTable):
     components: dict[str, Name | Literal[False]] = entry(
         "FMUs that replace the closed loop's own, or are added to them, as "
         '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
-        "this file. `false` removes a component, and its wires.",
+        "this file. The path of a .csv file stands for a planner that "
+        "[follows the table](../how-to/trajectories.md). `false` removes a component, and its "
+        "wires.",
         "none",
     )
     wires: dict[str, Name | Literal[False]] = entry(
@@ -183,8 +185,9 @@ class ScenarioFile(TomlTable):
     events: list[EventTable] = entry(
         "Events during the run, each as `[[events]]`: [see below](#events).", "none"
     )
-    inputs: InputsTable = entry(
-        "A table of inputs over time: [see below](#inputs).", "inputs keep their values"
+    inputs: InputsTable | list[InputsTable] = entry(
+        "Tables of inputs over time, as `[inputs]`, or each as `[[inputs]]`: [see below](#inputs).",
+        "inputs keep their values",
     )
     ours: Annotated[dict[str, Any], "table of texts"] = entry(
         'Values above that are not the paper\'s, and why: `stop_time = "why"`, '

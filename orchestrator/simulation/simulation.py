@@ -227,11 +227,11 @@ class Simulation:
         #: Events, tables and components that need whole steps of the same length.
         self._rigid = [
             *(["the scenario's events"] if prepared.events else []),
-            *(["the table of inputs"] if prepared.input_table else []),
+            *(["tables of inputs"] if prepared.input_tables else []),
             *(name for name, n in prepared.plan.decimations.items() if n > 1),
             *(name for name, component in components.items() if not component.takes_any_step),
         ]
-        self._has_hooks = bool(prepared.events or prepared.input_table)
+        self._has_hooks = bool(prepared.events or prepared.input_tables)
         self._closing = weakref.finalize(self, _close, self._session)
         self._names: dict[str, Any] = {}
         self._settables: dict[str, list[_Settable]] = {}
@@ -245,7 +245,7 @@ class Simulation:
         # Who names the file of an FMU means this file.
         is_fmu = isinstance(options.system, str | Path) and Path(options.system).suffix == ".fmu"
         if options.loop == PROGRAM or (options.loop == "auto" and not is_fmu):
-            if prepared.events or prepared.input_table:
+            if prepared.events or prepared.input_tables:
                 why = "it has no events and tables of inputs"
             elif options.isolate or options.kind == PYTHON:
                 why = "it runs no FMUs: leave out kind and isolate"

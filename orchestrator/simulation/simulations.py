@@ -84,7 +84,7 @@ class Simulations:
         same = {name: value for name, value in parameters.items() if name not in each}
         options = SystemOptions(system, same, stop_time=stop_time, step=step, order=order)
         prepared = prepare_options(options, is_open=True)
-        if prepared.events or prepared.input_table:
+        if prepared.events or prepared.input_tables:
             raise InputError(f"{prepared.scenario.name}: has events or a table of inputs")
         self._prepared, self._system = prepared, prepared.system
         program = self._program = stepped_program(prepared.plan, is_quick=True)

@@ -273,7 +273,7 @@ def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
     if name not in ENGINES:
         raise InputError(f"engine {name!r}: use one of {', '.join(ENGINES)}")
     for scenario, run in prepared.items():
-        if run.input_table is not None:
+        if run.input_tables:
             raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
         if name == BATCH and run.events:
             raise InputError(f"{scenario}: has events, which engine {BATCH!r} does not support")

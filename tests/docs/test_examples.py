@@ -24,7 +24,7 @@ from orchestrator.runs.scenario import read_scenario
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_figures, ready_studies, study_of
 from orchestrator.vehicle.indices import index_columns
-from orchestrator.vehicle.signals import true_control_point
+from orchestrator.vehicle.signals import tracking_error, true_control_point
 from support.machine import contents
 from support.markdown import DOCS, blocks
 from support.tiers import slow
@@ -266,17 +266,25 @@ def test_effort_of_the_pd_controller_belongs_to_the_plants_scheme_as_the_page_sa
 def test_a_users_trajectory_follows_its_table(capsys: pytest.CaptureFixture[str]):
     """Between the rows it follows the curve of the rows, whose derivatives are known."""
     executed(TRAJECTORIES, capsys)
-    Path("table_planner.py").write_text(blocks(TRAJECTORIES, "python")[1].text)
+    for command in blocks(TRAJECTORIES, "sh")[1].text.splitlines():
+        assert main(command.split()[1:]) == 0
     Path("eight.toml").write_text(blocks(TRAJECTORIES, "toml")[0].text)
-    assert main(["check", "table_planner.py"]) == 0
-    assert main(["build", "table_planner.py", "--kind", "native"]) == 0
-    result = simulate("eight.toml", kind="native", stop_time=60.0)
+    assert main(["check", "eight.toml"]) == 0
+    result = simulate("eight.toml")
     w, t = 2.0 * np.pi / 240.0, result.time
     x, y = 20.0 * np.exp(1j * w * t), 10.0 * np.exp(2j * w * t)
-    assert np.abs(result["planner.y_d.x"] - x.imag).max() < 1e-6
-    assert np.abs(result["planner.dy_d.x"] - (1j * w * x).imag).max() < 1e-5
-    assert np.abs(result["planner.ddy_d.y"] - ((2j * w) ** 2 * y).imag).max() < 1e-3
-    assert max(result.metrics()["final_error"]) < 0.5
+    assert np.abs(result["planner.y_d.x"] - x.imag).max() < 2e-9
+    assert np.abs(result["planner.dy_d.x"] - (1j * w * x).imag).max() < 2e-8
+    assert np.abs(result["planner.ddy_d.y"] - ((2j * w) ** 2 * y).imag).max() < 2e-6
+    away = np.linalg.norm(tracking_error(result), axis=1)[t > 20.0].max()
+    assert away == pytest.approx(0.2, abs=0.01)
+    lines = Path("track.csv").read_text().splitlines()[1:]
+    rows = (line.partition(",") for line in lines)
+    quick = "".join(f"{float(t) / 4},{place}\n" for t, _, place in rows)
+    Path("track.csv").write_text(f"t,x,y,z\n{quick}")
+    with pytest.raises(ValueError, match="planner") as refused:
+        simulate("eight.toml")
+    assert str(refused.value) == " ".join(blocks(TRAJECTORIES, "text")[0].text.split())
 
 
 def test_master_runs_an_ssp_as_its_page_says(native, workplace, capsys):

@@ -12,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from auv_fmu.guidance import formation
+from auv_fmu.guidance.follower import Follower
 from auv_fmu.guidance.formation import Estimator, FormationState, Heading, Parameters
+from auv_fmu.paper.actuators import Limits
 from support import formation_bounds
 from support.formation_bounds import ACCELERATION_GAIN, LAG_GAIN, RATE_GAIN, Messages
 from support.formations import follow, known, tables
@@ -68,8 +70,9 @@ def test_a_zigzag_comes_near_what_is_proven():
 )
 def test_reference_is_within_its_bounds(parameters, headings, moving):
     """With any heading; velocity and acceleration of the leader need not fit together."""
-    wide = (-1e9,) * 3, (1e9,) * 3
-    parameters = parameters._replace(speed_max=1e9, turn_max=1e9, limits=wide)
+    wide = Limits((-1e9,) * 3, (1e9,) * 3)
+    strong = Follower(speed_max=1e9, turn_max=1e9, limits=wide)
+    parameters = parameters._replace(follower=strong)
     dy_0, ddy_0 = moving[:3], moving[3:]
     bounds = formation_bounds.reference_bounds(parameters, hypot(*dy_0), hypot(*ddy_0))
     y_0, t, h = (1.0, 2.0, 3.0), 0.0, 0.4

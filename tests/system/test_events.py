@@ -186,6 +186,28 @@ def test_water_that_moves_is_added_to_the_current(tmp_path):
             np.testing.assert_array_equal(fed[name], set_[name], name)
 
 
+def test_tables_of_inputs_side_by_side_act_as_one(tmp_path):
+    """Rows of both at other times; one is interpolated, as the whole table is, and one is not."""
+    x = [(0.0, 0.1), (0.3, 0.4), (0.9, -0.2)]
+    (tmp_path / "x.csv").write_text("time,plant.water.x\n" + "".join(f"{t},{v}\n" for t, v in x))
+    (tmp_path / "z.csv").write_text("time,plant.water.z\n0.0,0.5\n0.5,0.25\n")
+    (tmp_path / "two.toml").write_text(
+        'only = ["plant"]\nstop_time = 1.0\n[[inputs]]\nfile = "x.csv"\n'
+        '[[inputs]]\nfile = "z.csv"\nbetween = "hold"\n'
+    )
+    two = simulate(tmp_path / "two.toml")
+    times = np.arange(51) * 0.02
+    z = np.where(times < 0.499, 0.5, 0.25)
+    np.testing.assert_allclose(two["plant.water.x"], np.interp(times, *zip(*x, strict=True)))
+    np.testing.assert_array_equal(two["plant.water.z"], z)
+    rows = zip(times.tolist(), two["plant.water.x"].tolist(), z.tolist(), strict=True)
+    text = "".join(f"{t!r},{u!r},{w!r}\n" for t, u, w in rows)
+    (tmp_path / "both.csv").write_text(f"time,plant.water.x,plant.water.z\n{text}")
+    one = simulate({"only": ["plant"]}, stop_time=1.0, inputs=[tmp_path / "both.csv"])
+    for name in one.columns:
+        np.testing.assert_allclose(two[name], one[name], atol=1e-12, err_msg=name)
+
+
 @pytest.mark.parametrize(("between", "way"), [("hold", WAYS[1]), ("linear", WAYS[0])], ids=str)
 def test_an_override_hides_a_table_of_inputs_until_it_ends(tmp_path, way, between):
     """The table changes during the override."""

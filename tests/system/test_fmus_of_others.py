@@ -323,7 +323,7 @@ def test_real_inputs_follow_a_table_as_their_variability_says(tmp_path, variabil
     rows = [(0.0, 0.0), (0.4, 1.0), (0.75, 3.0)]
     file = tmp_path / "inputs.csv"
     file.write_text("time,a.u\n" + "".join(f"{t},{u}\n" for t, u in rows))
-    system, input_table = read_inputs(Inputs(file), system_of(fmu), ())
+    system, [input_table] = read_inputs([Inputs(file)], system_of(fmu), ())
     table = run(system, hooks=[input_table.playback()], **way)
     inputs = np.array(rows, dtype=[("time", float), ("u", float)])
     theirs = fmpy.simulate_fmu(

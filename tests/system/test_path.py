@@ -14,7 +14,8 @@ from orchestrator import load
 from orchestrator.commands.main import main
 from orchestrator.cosim import PortName, System, read_component
 from orchestrator.machine.errors import InputError
-from orchestrator.runs.scenario import impossible_paths, read_scenario
+from orchestrator.program.components import refusals
+from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.signals import tracking_error
 from support.archives import fmu, variable
@@ -109,4 +110,4 @@ def test_another_model_of_the_name_is_left_alone(tmp_path: Path):
         archive.writestr("modelDescription.xml", renamed)
     component = read_component("planner", file)
     assert component.description.modelName == "PathPlanner"
-    assert [*impossible_paths(System("s", {"planner": component}, ()))] == []
+    assert [*refusals(System("s", {"planner": component}, ()))] == []

@@ -42,8 +42,7 @@ SECTION_4_1 = {
     "motion_planner.Parameters": {
         "ell": 0.35, "tau_d": (5.0, 1.0, 2.0), "eta0": (0.0, 0.0, -2.0, 0.0, 0.0),
     },
-    "path_planner.Parameters": {"ell": 0.35},
-    "formation.Parameters": {"ell": 0.35},
+    "Follower": {"ell": 0.35},
     "LongestSteps": dict.fromkeys(("plant", "controller", "planner"), 0.02),
     "Setting": {"h": 0.02},
 }  # fmt: skip
@@ -64,7 +63,7 @@ OURS = {
         "cruise": 0.5,
         "rounding": 6.0,
     },
-    "path_planner.Parameters": {"speed_max": 2.5, "turn_max": 4.0},
+    "Follower": {"speed_max": 2.5, "turn_max": 4.0},
     "Waves": {
         "spectrum": Spectrum.JONSWAP, "Hs": 1.0, "Tp": 7.0, "gamma": 3.3, "highest": 4.0,
         "direction": 0.0, "s": 10.0, "n": 32, "seed": 1,
@@ -78,7 +77,6 @@ OURS = {
     "Estimator": {"lambda_": 0.5, "k_d": 0.5, "age_max": 4.0, "z_max": 2.0},
     "formation.Parameters": {
         "number": 2, "vehicles": 3, "omega_chi": 0.3, "turn_chi": 0.2, "estimated": False,
-        "speed_max": 2.5, "turn_max": 4.0,
     },
     "acoustic_link.Parameters": {
         "period": 1.0, "sound_speed": 1500.0, "latency": 0.2, "loss": 0.0, "seed": 1,

@@ -33,7 +33,8 @@ from enum import IntEnum
 from math import atan2, cos, exp, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.guidance import path_planner
+from auv_fmu.guidance import follower
+from auv_fmu.guidance.follower import Follower
 from auv_fmu.language.quantities import ACCELERATION, POSITION, VELOCITY
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import (
@@ -49,11 +50,8 @@ from auv_fmu.language.vectors import (
     sub_scaled,
 )
 from auv_fmu.paper import observer
-from auv_fmu.paper.actuators import Limits
-from auv_fmu.paper.control_point import ELL, Distance
 from auv_fmu.paper.motion_planner import Reference
 from auv_fmu.paper.saturation import TANH, saturation
-from auv_fmu.paper.vehicle import Vehicle
 
 #: Most stages, as many as a Vector4 holds.
 MOST = 4
@@ -174,11 +172,7 @@ class Parameters(NamedTuple):
         ),
     ] = False
     estimator: Annotated[Estimator, Variable(name="")] = Estimator()
-    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: follower
-    ell: Distance = ELL
-    limits: Annotated[Limits, Variable(name="")] = Limits()
-    speed_max: Annotated[float, Variable("m/s", "Largest accepted speed", 0.0)] = 2.5
-    turn_max: Annotated[float, Variable("rad/s", "Largest accepted turn rate", 0.0)] = 4.0
+    follower: Annotated[Follower, Variable(name="")] = Follower()
 
 
 class Known(NamedTuple):
@@ -426,7 +420,7 @@ def reference(parameters: Parameters, state: FormationState, known: Known, t: fl
         add(ddy_0, ahead(chi, sub_scaled(faster, dchi * dchi, level))),
     )
     if not parameters.estimated:
-        check_reference(parameters, wanted)
+        check_reference(parameters.follower, wanted, t)
     return wanted
 
 
@@ -453,14 +447,14 @@ def posture(parameters: Parameters, state: FormationState, wanted: Reference) ->
     along = wanted.dy_d
     if norm(along) == 0.0:
         along = ahead(state.heading.chi, (1.0, 0.0, 0.0))
-    return path_planner.posture(wanted.y_d, along, parameters.ell)
+    return follower.posture(wanted.y_d, along, parameters.follower.ell)
 
 
 # Limits of the vehicle
 
 
-def check_reference(parameters: Parameters, wanted: Reference) -> None:
-    """Refuse a reference, at one time, that the vehicle cannot follow.
+def check_reference(vehicle: Follower, wanted: Reference, t: float) -> None:
+    """Refuse a reference, at a time [s], that the vehicle cannot follow.
 
     The vehicle can follow it if it could with any heading, or else by a steady motion along the
     path. The first criterion is for formations that start to move and turn: places on the inner
@@ -470,40 +464,15 @@ def check_reference(parameters: Parameters, wanted: Reference) -> None:
         ImpossiblePath: a limit is exceeded.
 
     """
-    if not is_easy(parameters, wanted):
-        path_planner.check_demand(
-            path_planner.demand(parameters.vehicle, parameters.ell, wanted),
-            parameters.limits,
-            parameters.speed_max,
-            parameters.turn_max,
-            0,
-            wanted.y_d,
+    if not follower.is_easy(vehicle, wanted):
+        follower.check_demand(
+            vehicle,
+            wanted,
+            "at t = ",
+            t,
+            " s",
+            "lead more slowly or in wider turns, or take a place nearer to the leader",
         )
-
-
-def is_easy(parameters: Parameters, wanted: Reference) -> bool:
-    """True if the vehicle can follow a reference, at one time, with any heading.
-
-    The surge force moves the control point along the bow, and the moments move it across, ell ahead
-    of the centre of mass. Sway and heave are neglected.
-
-    Args:
-        parameters: of the planner.
-        wanted: reference of the vehicle.
-
-    """
-    vehicle, ell, (least, most) = parameters.vehicle, parameters.ell, parameters.limits
-    speed, a = norm(wanted.dy_d), norm(wanted.ddy_d)
-    tau_u = vehicle.m11 * a + vehicle.d11 * speed
-    tau_q = (vehicle.m55 * a + vehicle.d55 * speed) / ell + abs(vehicle.righting_pitch)
-    tau_r = (vehicle.m66 * a + vehicle.d66 * speed) / ell
-    return (
-        speed <= parameters.speed_max
-        and speed / ell <= parameters.turn_max
-        and tau_u <= min(most[0], -least[0])
-        and tau_q <= min(most[1], -least[1])
-        and tau_r <= min(most[2], -least[2])
-    )
 
 
 def check(parameters: Parameters) -> None:
@@ -513,17 +482,14 @@ def check(parameters: Parameters) -> None:
         ImpossibleFormation: a change is too fast, or begins before the one before is over.
 
     """
-    stages, vehicle = parameters.stages, parameters.vehicle
+    stages, (vehicle, _, limits, speed_max, _) = parameters.stages, parameters.follower
     if parameters.number > parameters.vehicles:
         raise ImpossibleFormation(
             f"number is {parameters.number:d}, and there are {parameters.vehicles:d} vehicles: "
             f"raise vehicles or choose an earlier place"
         )
-    if not (vehicle.d22 > 0.0 and vehicle.d33 > 0.0):
-        raise ImpossibleFormation(
-            "d22 and d33 must be positive: nothing else limits the drift in a turn"
-        )
-    most = min(parameters.limits.tau_max[0], -parameters.limits.tau_min[0])
+    follower.check(parameters.follower)
+    most = min(limits.tau_max[0], -limits.tau_min[0])
     for k in range(1, MOST):
         if k < stages.n:
             t, T = stages.t[k - 1], stages.duration[k - 1]
@@ -534,11 +500,11 @@ def check(parameters: Parameters) -> None:
                 )
             way = distance(offset(parameters, k), offset(parameters, k - 1))
             speed = PEAK_SPEED * way / T
-            if speed > parameters.speed_max:
+            if speed > speed_max:
                 raise ImpossibleFormation(
                     f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
-                    f"{speed:.3g} m/s, more than speed_max, {parameters.speed_max:g}; give it at "
-                    f"least {PEAK_SPEED * way / parameters.speed_max:.3g} s"
+                    f"{speed:.3g} m/s, more than speed_max, {speed_max:g}; give it at "
+                    f"least {PEAK_SPEED * way / speed_max:.3g} s"
                 )
             force = vehicle.m11 * PEAK_ACCELERATION * way / (T * T)
             if force > most:

@@ -30,20 +30,18 @@ from __future__ import annotations
 from math import atan2, degrees, sqrt, tan
 from typing import Annotated, NamedTuple
 
+from auv_fmu.guidance import follower
+from auv_fmu.guidance.follower import Follower, ImpossiblePath
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import (
     Vector3,
-    Vector5,
     Vector32,
     add_scaled,
     distance,
     norm,
     sub,
 )
-from auv_fmu.paper.actuators import Limits
-from auv_fmu.paper.control_point import ELL, Distance
 from auv_fmu.paper.motion_planner import STEEPEST, Reference
-from auv_fmu.paper.vehicle import Vehicle
 
 #: Most waypoints of a path, as many as a Vector32 holds; and zeros for those that are not used.
 MOST = 32
@@ -65,10 +63,6 @@ _OF_THE_FASTEST = 1e-12
 _SHORTEST = 1e-6
 
 _AT_REST: Vector3 = (0.0, 0.0, 0.0)
-
-
-class ImpossiblePath(ArithmeticError):
-    """The vehicle cannot follow the path."""
 
 
 class Waypoints(NamedTuple):
@@ -124,13 +118,7 @@ class Parameters(NamedTuple):
     """All parameters of the planner."""
 
     waypoints: Annotated[Waypoints, Variable(name="")] = Waypoints()
-    vehicle: Annotated[Vehicle, Variable(name="")] = Vehicle()  #: follower
-    ell: Distance = ELL
-    limits: Annotated[Limits, Variable(name="")] = Limits()
-    #: By (2) and (3) the vehicle reaches 2.67 m/s straight ahead.
-    speed_max: Annotated[float, Variable("m/s", "Largest accepted speed", 0.0)] = 2.5
-    #: By (2) and (3) the vehicle at rest reaches this rate of turn.
-    turn_max: Annotated[float, Variable("rad/s", "Largest accepted turn rate", 0.0)] = 4.0
+    follower: Annotated[Follower, Variable(name="")] = Follower()
 
 
 class Corner(NamedTuple):
@@ -146,14 +134,6 @@ class PathState(NamedTuple):
     start: float  #: time at which the run began [s]
     t: float  #: time [s]
     ahead: Corner  #: first corner whose rounding is not over
-
-
-class Demand(NamedTuple):
-    """Motion and forces that a path demands of the vehicle at an instant."""
-
-    speed: float  #: [m/s]
-    turn: float  #: rate at which the path turns [rad/s]
-    tau: Vector3  #: (u, q, r) [N, N.m]
 
 
 # The path
@@ -277,70 +257,6 @@ def course(waypoints: Waypoints, corner: Corner, dy_d: Vector3) -> Vector3:
     return dy_d
 
 
-def posture(y_d: Vector3, along: Vector3, ell: float) -> Vector5:
-    """Posture (x, y, z, theta, psi) of a vehicle on the path that points along it.
-
-    Args:
-        y_d: its control point [m], earth frame.
-        along: direction of the path, earth frame, of any length but 0.
-        ell: distance of the control point [m].
-
-    """
-    dx, dy, dz = along
-    x, y, z = add_scaled(y_d, -ell / norm(along), along)
-    return x, y, z, atan2(-dz, sqrt(dx * dx + dy * dy)), atan2(dy, dx)
-
-
-# Demands on the vehicle
-
-
-def demand(vehicle: Vehicle, ell: float, moment: Reference) -> Demand:
-    """Force and moments by (2) of a vehicle that turns steadily with the path.
-
-    In a steady turn sway and heave are v = -m11 u r / d22 and w = m11 u q / d33, so the speed of
-    the control point (10) gives the surge u, and (2) the force and moments. The force that
-    accelerates the vehicle along the path is added.
-
-    Args:
-        vehicle: parameters.
-        ell: distance of the control point [m].
-        moment: reference at an instant, with a velocity that is neither zero nor vertical.
-
-    Raises:
-        ImpossiblePath: the path turns within the length ell, which no steady motion does.
-
-    """
-    m11, m22, m33 = vehicle.m11, vehicle.m22, vehicle.m33
-    (x, y, z), (dx, dy, dz), (ddx, ddy, ddz) = moment
-    speed, level = norm(moment.dy_d), sqrt(dx * dx + dy * dy)
-    faster = (dx * ddx + dy * ddy) / level
-    q = (dz * faster - ddz * level) / (speed * speed)
-    r = (dx * ddy - dy * ddx) / (level * speed)
-    # speed^2 = u^2 + (v + ell r)^2 + (w - ell q)^2, with sway and heave as functions of u.
-    sway, heave = m11 * r / vehicle.d22, m11 * q / vehicle.d33
-    A = 1.0 + sway * sway + heave * heave
-    B = ell * (sway * r + heave * q)
-    C = ell * ell * (r * r + q * q) - speed * speed
-    if B * B < A * C:
-        raise ImpossiblePath(
-            f"at ({x:.3g}, {y:.3g}, {z:.3g}) m the path turns at {sqrt(r * r + q * q):.3g} rad/s "
-            f"with {speed:.3g} m/s: more tightly than the vehicle's control point can, {ell:g} m "
-            f"ahead; turn more widely, with a longer rounding"
-        )
-    u = (B + sqrt(B * B - A * C)) / A
-    v, w = -sway * u, heave * u
-    thrust = m11 * (dx * ddx + dy * ddy + dz * ddz) / speed
-    return Demand(
-        speed,
-        sqrt(r * r + q * q),
-        (
-            thrust + vehicle.d11 * u - m22 * v * r + m33 * w * q,
-            vehicle.d55 * q + vehicle.righting_pitch * -dz / speed - (m33 - m11) * u * w,
-            vehicle.d66 * r - (m11 - m22) * u * v,
-        ),
-    )
-
-
 # Checks
 
 
@@ -351,11 +267,8 @@ def check(parameters: Parameters) -> None:
         ImpossiblePath: the waypoints make no path, or the path exceeds a limit.
 
     """
-    waypoints, vehicle = parameters.waypoints, parameters.vehicle
-    if not (vehicle.d22 > 0.0 and vehicle.d33 > 0.0):
-        raise ImpossiblePath(
-            "d22 and d33 must be positive: nothing else limits the drift in a turn"
-        )
+    waypoints = parameters.waypoints
+    follower.check(parameters.follower)
     k = 1
     while k < waypoints.n:
         _check_leg(waypoints, k)
@@ -522,76 +435,13 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
                 f"can follow; add a waypoint to one side"
             )
         if moves:
-            _check_moment(parameters, corner.k + 1, moment)
+            follower.check_demand(
+                parameters.follower,
+                moment,
+                "near waypoint ",
+                float(corner.k + 1),
+                "",
+                "reduce the speed, or turn more widely with a longer rounding",
+            )
         before = moment.dy_d
         i = i + 1
-
-
-def _check_moment(parameters: Parameters, number: int, moment: Reference) -> None:
-    """Refuse an instant, near a waypoint, that demands too much."""
-    check_demand(
-        demand(parameters.vehicle, parameters.ell, moment),
-        parameters.limits,
-        parameters.speed_max,
-        parameters.turn_max,
-        number,
-        moment.y_d,
-    )
-
-
-def check_demand(
-    asked: Demand, limits: Limits, speed_max: float, turn_max: float, number: int, y_d: Vector3
-) -> None:
-    """Refuse a demand beyond the limits.
-
-    Args:
-        asked: demand on the vehicle.
-        limits: of its actuators.
-        speed_max: largest accepted speed [m/s].
-        turn_max: largest accepted turn rate [rad/s].
-        number: of the waypoint nearby, from 1; 0: there are no waypoints.
-        y_d: control point [m].
-
-    Raises:
-        ImpossiblePath: the demand exceeds a limit.
-
-    """
-    speed, turn, (tau_u, tau_q, tau_r) = asked
-    tau_min, tau_max = limits
-    check_range("a speed", speed, 0.0, speed_max, "m/s", number, y_d)
-    check_range("a turn", turn, 0.0, turn_max, "rad/s", number, y_d)
-    check_range("a surge force", tau_u, tau_min[0], tau_max[0], "N", number, y_d)
-    check_range("a moment in pitch", tau_q, tau_min[1], tau_max[1], "N.m", number, y_d)
-    check_range("a moment in yaw", tau_r, tau_min[2], tau_max[2], "N.m", number, y_d)
-
-
-def check_range(
-    what: str, asked: float, least: float, most: float, unit: str, number: int, y_d: Vector3
-) -> None:
-    """Refuse a value out of range.
-
-    Args:
-        what: the quantity in words.
-        asked: its value.
-        least, most: its limits.
-        unit: of these numbers.
-        number: of the waypoint nearby, from 1; 0: there are no waypoints.
-        y_d: control point [m].
-
-    Raises:
-        ImpossiblePath: the value is out of range.
-
-    """
-    if not least <= asked <= most:
-        limit = least if asked < least else most
-        if number == 0:
-            raise ImpossiblePath(
-                f"at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m the reference asks for {what} of "
-                f"{asked:.3g} {unit}, {abs(asked - limit):.2g} beyond the limit of {limit:.3g}; "
-                f"lead more slowly or in wider turns, or take a place nearer to the leader"
-            )
-        raise ImpossiblePath(
-            f"near waypoint {number:d}, at ({y_d[0]:.3g}, {y_d[1]:.3g}, {y_d[2]:.3g}) m, the path "
-            f"asks for {what} of {asked:.3g} {unit}, {abs(asked - limit):.2g} beyond the limit of "
-            f"{limit:.3g}; reduce the speed or raise rounding"
-        )

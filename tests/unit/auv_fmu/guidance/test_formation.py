@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu.guidance import formation
+from auv_fmu.guidance.follower import Follower, ImpossiblePath
 from auv_fmu.guidance.formation import (
     Estimator,
     FormationState,
@@ -22,11 +23,11 @@ from auv_fmu.guidance.formation import (
     Shape,
     Stages,
 )
-from auv_fmu.guidance.path_planner import ImpossiblePath
 from auv_fmu.loop import closed_loop
 from auv_fmu.loop.closed_loop import PAPER
 from auv_fmu.paper import motion_planner
 from auv_fmu.paper.motion_planner import Reference
+from auv_fmu.paper.vehicle import Vehicle
 from support.formations import FOUR, ORIGIN, every, follow, known, tables
 from support.helix import helix
 
@@ -283,8 +284,8 @@ def test_changes_that_no_vehicle_can_follow_are_refused(stages, why):
 def test_other_parameters_that_do_not_fit_are_refused():
     with pytest.raises(ImpossibleFormation, match="number is 4, and there are 3 vehicles"):
         formation.check(DEFAULT._replace(number=4))
-    with pytest.raises(ImpossibleFormation, match="d22 and d33 must be positive"):
-        formation.check(DEFAULT._replace(vehicle=DEFAULT.vehicle._replace(d22=0.0)))
+    with pytest.raises(ImpossiblePath, match="d22 and d33 must be positive"):
+        formation.check(DEFAULT._replace(follower=Follower(Vehicle(d22=0.0))))
     formation.check(DEFAULT)
 
 
@@ -298,7 +299,8 @@ def test_other_parameters_that_do_not_fit_are_refused():
         ),
         (
             known(dy_0=(1.0, 0.0, 0.0), ddy_0=(0.0, 4.5, 0.0)),
-            "at (0, 5, 0) m the reference asks for a turn of 4.5 rad/s, 0.5 beyond the limit of 4",
+            "at t = 0 s, at (0, 5, 0) m, the path asks for a turn of 4.5 rad/s, 0.5 beyond the "
+            "limit of 4",
         ),
     ],
 )

@@ -11,8 +11,10 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from auv_fmu.guidance import path_planner
-from auv_fmu.guidance.path_planner import MOST, ImpossiblePath, Parameters, Waypoints, check, demand
+from auv_fmu.guidance.follower import Follower, ImpossiblePath, demand, posture
+from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints, check
 from auv_fmu.paper import motion_planner
+from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.motion_planner import Reference
 from auv_fmu.paper.vehicle import Vehicle, accelerations
 from support.helix import helix_after
@@ -181,8 +183,14 @@ UP_80 = (10, 0, 10 * tan(radians(80.0)))
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"waypoints": CORNER, "speed_max": 0.4}, r"near waypoint 1, .* a speed of 0\.4.* 0\.4;"),
-        ({"waypoints": CORNER, "turn_max": 0.4}, r"near waypoint 2, at \(19.* a turn of 0\.4"),
+        (
+            {"waypoints": CORNER, "follower": Follower(speed_max=0.4)},
+            r"near waypoint 1, .* a speed of 0\.4.* 0\.4;",
+        ),
+        (
+            {"waypoints": CORNER, "follower": Follower(turn_max=0.4)},
+            r"near waypoint 2, at \(19.* a turn of 0\.4",
+        ),
         ({"waypoints": path((0, 0, 0), (20, 0, 0), rounding=0.2)}, "waypoint 1.* surge force of"),
         ({"waypoints": CORNER._replace(rounding=1.0)}, r"at \(19\..*more tightly than .* 0.35 m"),
         ({"waypoints": path((0, 0, 0), (9, 0, 0), (0, 0, 0))}, "straight back at waypoint 2"),
@@ -208,8 +216,11 @@ UP_80 = (10, 0, 10 * tan(radians(80.0)))
             r"near waypoint 2, .* climbs or dives at 89\.\d degrees, 4\.\d+ beyond",
         ),
         ({"waypoints": path((0, 0, 0), (1, 0, 5), (0, 0, 10))}, "waypoint 2, .* at 90.0 degrees"),
-        ({"speed_max": 0.49999999}, r"a speed of 0\.5 m/s, 1e-08 beyond the limit of 0\.5; reduce"),
-        ({"vehicle": Vehicle(d33=0.0)}, "d22 and d33 must be positive"),
+        (
+            {"follower": Follower(speed_max=0.49999999)},
+            r"a speed of 0\.5 m/s, 1e-08 beyond the limit of 0\.5; reduce",
+        ),
+        ({"follower": Follower(Vehicle(d33=0.0))}, "d22 and d33 must be positive"),
     ],
 )  # fmt: skip
 def test_path_that_cannot_be_followed_is_refused_where_it_cannot(changes, message):
@@ -300,7 +311,7 @@ def test_a_rest_may_separate_two_opposite_ways():
 @pytest.mark.parametrize("sign", [1, -1])
 def test_path_is_let_pass_up_to_each_limit_of_3(axis, k, sign):
     """The default path, whose greatest demands are looked for in steps of 20 ms."""
-    default = Parameters()
+    default, given_limits = Parameters(), Limits()
     asked = [
         sign * demand(VEHICLE, ELL, moment).tau[k]
         for moment in (at(default.waypoints, 0.05 + 0.02 * i) for i in range(4800))
@@ -310,9 +321,10 @@ def test_path_is_let_pass_up_to_each_limit_of_3(axis, k, sign):
     name = "tau_max" if sign > 0 else "tau_min"
 
     def limited(limit):
-        limits = list(getattr(default.limits, name))
+        limits = list(getattr(given_limits, name))
         limits[k] = sign * limit
-        return default._replace(limits=default.limits._replace(**{name: tuple(limits)}))
+        changed = given_limits._replace(**{name: tuple(limits)})
+        return default._replace(follower=Follower(limits=changed))
 
     check(limited(most * 1.01 + 1e-9))
     if most > 1e-6:
@@ -328,7 +340,7 @@ def test_posture_points_along_the_path_and_carries_the_control_point(drawn):
     y_d, dy_d, _ = path_planner.reference(waypoints, corner, t)
     along = path_planner.course(waypoints, corner, dy_d)
     assume(hypot(*along) > 1e-6)
-    x, y, z, theta, psi = path_planner.posture(y_d, along, ELL)
+    x, y, z, theta, psi = posture(y_d, along, ELL)
     e1 = np.array([cos(theta) * cos(psi), cos(theta) * sin(psi), -sin(theta)])
     np.testing.assert_allclose(np.array([x, y, z]) + ELL * e1, y_d, atol=1e-9)
     np.testing.assert_allclose(np.cross(e1, along), 0.0, atol=1e-9 * hypot(*along))

@@ -227,7 +227,8 @@ def an_event(run: Prepared, choice: Choice) -> Prepared:
 def inputs(run: Prepared, choice: Choice) -> Prepared:
     values = np.array([[choice.number]])
     target = PortName("controller", "y.x")
-    return replace(run, input_table=InputTable((target,), np.zeros(1), values, np.array([False])))
+    table = InputTable((target,), np.zeros(1), values, np.array([False]))
+    return replace(run, input_tables=(table,))
 
 
 OTHERS = [

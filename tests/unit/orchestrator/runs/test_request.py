@@ -34,7 +34,7 @@ GIVEN: Mapping[type[Any], Mapping[str, Any]] = {
         "--coupling linear": "linear",
         "--kind native": "native",
         "--events mine.toml": "mine.toml",
-        "--inputs table.csv": Path("table.csv"),
+        "--inputs a.csv --inputs b.csv": [Path("a.csv"), Path("b.csv")],
         "--loop compiled": "compiled",
         "--isolate": True,
         "--step-timeout 3": 3.0,

@@ -126,7 +126,8 @@ def test_every_entry_of_a_scenario_can_be_written():
 def read_table(tmp_path, text, between="linear", given=(), scenario="fig3a"):
     file = tmp_path / "inputs.csv"
     file.write_text(text)
-    return read_inputs(Inputs(file, between), load(scenario, "native"), given)
+    system, [table] = read_inputs([Inputs(file, between)], load(scenario, "native"), given)
+    return system, table
 
 
 def test_a_run_begins_with_the_values_of_the_table_at_its_start(tmp_path):
@@ -189,7 +190,16 @@ def test_a_value_in_addition_to_the_table_is_refused(tmp_path):
     inputs = tmp_path / "inputs.csv"
     prepared = prepare(*load_scenario("fig3a", "native"), Request(kind="native", inputs=inputs))
     assert prepared.system.parameters[U] == 1.0
-    assert np.array_equal(prepared.input_table.values, [[1.0]])
+    assert np.array_equal(prepared.input_tables[0].values, [[1.0]])
+
+
+def test_two_tables_of_one_input_are_refused_by_its_name(tmp_path):
+    inputs = [Inputs(tmp_path / file) for file in ("a.csv", "b.csv")]
+    for table in inputs:
+        table.file.write_text("time,plant.tau.u\n0,1\n")
+    with pytest.raises(InputError) as refused:
+        read_inputs(inputs, load("fig3a", "native"), ())
+    assert mentions(str(refused.value), "b.csv plant.tau.u a.csv")
 
 
 def parameters(path: Path, text: str) -> dict[str, object]:
