@@ -421,6 +421,10 @@ class Table:
         """Keep the ending."""
         self.ending = ending
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state with the rows that were taken, without the room for others."""
+        return {**self.__dict__, "_rows": self.rows}
+
     def __len__(self) -> int:
         """Return the number of rows."""
         return self._n

@@ -9,11 +9,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from orchestrator.cosim import Order, Plan, PortName, make_plan
-from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.machine.user_files import read_archive
@@ -151,35 +149,13 @@ class FmuEngine:
         return Outcome(point.number, values, None, kinds)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state with the content of the FMUs, each once, by their hashes.
+        """Return the state, in which each system has its FMUs.
 
         Raises:
             InputError: one has changed since it was read.
 
         """
-        archives = {
-            part.digest: read_archive(part.fmu, part.digest)
-            for prepared in self._prepared.values()
-            for part in prepared.system.components.values()
-        }
-        state = {"prepared": self._prepared, "loop": self._loop, "own": self._own}
-        return {**state, "archives": archives}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Write the FMUs into the temporary folder of this process."""
-        self._prepared, self._loop, self._own = {}, state["loop"], state["own"]
-        for name, prepared in state["prepared"].items():
-            components = {
-                part.name: replace(part, fmu=_written(part.digest, state["archives"][part.digest]))
-                for part in prepared.system.components.values()
-            }
-            system = replace(prepared.system, components=components)
-            self._prepared[name] = replace(prepared, plan=replace(prepared.plan, system=system))
-
-
-def _written(digest: str, content: bytes) -> Path:
-    """Write an FMU unless it is there; return its path."""
-    path = process_folder() / f"{digest}.fmu"
-    if not path.exists():
-        path.write_bytes(content)
-    return path
+        for prepared in self._prepared.values():
+            for part in prepared.system.components.values():
+                read_archive(part.fmu, part.digest)
+        return self.__dict__

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import pickle
+import shutil
 from concurrent.futures import ProcessPoolExecutor
 from copy import deepcopy
 from datetime import datetime
@@ -17,7 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import orchestrator
-from orchestrator import Result, read, simulate
+from orchestrator import Result, load, read, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim import Ending, Experiment, Header, Occurrence, PortName
 from orchestrator.figures.drawing import save
@@ -104,16 +105,40 @@ def test_a_copied_result_is_the_same(tmp_path, loop):
 
 
 @pytest.mark.parametrize("method", ["spawn", *slow("fork", "forkserver")])
-def test_a_result_is_returned_by_a_pool_of_processes(tmp_path, method):
+@pytest.mark.parametrize("name", ["auv.ssp", "fig4"])
+def test_a_result_is_returned_by_a_pool_of_processes(native, tmp_path, name, method):
     """Also after the process that made it has ended, and removed its unpacked FMUs."""
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip(f"there is no {method} here")
+    system = str(native / name) if name.endswith(".ssp") else name
     context = multiprocessing.get_context(method)
     loop = "python" if find_compiler() is None else "compiled"
     with ProcessPoolExecutor(1, mp_context=context) as pool:
-        found = pool.submit(simulate, "fig4", stop_time=0.1, loop=loop).result()
-    assert is_the_same(found, simulate("fig4", stop_time=0.1))
+        found = pool.submit(simulate, system, stop_time=0.1, loop=loop).result()
+    assert is_the_same(found, simulate(system, stop_time=0.1))
     assert np.array_equal(read(found.save(tmp_path)).rows, found.rows)
+    assert np.array_equal(simulate(found.system, stop_time=0.1).rows, found.rows)
+
+
+def test_a_system_brings_its_fmus_to_other_processes(native, tmp_path):
+    path = tmp_path / "AuvPlant.fmu"
+    shutil.copy(native / path.name, path)
+    sent = pickle.dumps(load(str(path)))
+    path.write_bytes(b"another")
+    arrived = pickle.loads(sent)
+    twice = pickle.loads(pickle.dumps(arrived))
+    for system in (arrived, twice):
+        rows = simulate(system, stop_time=0.1, step=0.02).rows
+        assert np.array_equal(
+            rows, simulate(str(native / path.name), stop_time=0.1, step=0.02).rows
+        )
+    assert [part.fmu.name for part in arrived.components.values()] == [path.name]
+
+
+def test_a_failed_result_is_pickled_without_the_rows_that_it_lacks(failed):
+    room = 8 * 5001 * (1 + len(failed.columns))
+    again = pickle.loads(sent := pickle.dumps(failed))
+    assert np.array_equal(again.rows, failed.rows) and len(sent) < room / 2
 
 
 def test_failure_and_events_are_read_again(failed, tmp_path):
