@@ -152,6 +152,11 @@ class Result(Table):
             f"<table>{''.join(rows)}</table></div>"
         )
 
+    def end(self, ending: Ending) -> None:
+        """Keep the ending and the duration."""
+        super().end(ending)
+        self._clock.stop()
+
     @cached_property
     def parameters(self) -> Parameters:
         """Parameters of all components, as the FMUs reported them after initialisation."""
@@ -342,13 +347,17 @@ class Stopwatch:
     def __init__(self) -> None:
         """Start now."""
         self._started = datetime.now(UTC)
-        self._tick = monotonic()
+        self._tick, self._end = monotonic(), 0.0
+
+    def stop(self) -> None:
+        """End the run."""
+        self._end = monotonic()
 
     def times(self) -> dict[str, object]:
         """Return the entries of a record."""
         return {
             "started": self._started.isoformat(timespec="seconds"),
-            "seconds": round(monotonic() - self._tick, 3),
+            "seconds": round((self._end or monotonic()) - self._tick, 3),
         }
 
 

@@ -395,3 +395,10 @@ def test_duration_does_not_depend_on_the_clock(monkeypatch):
     times = Stopwatch().times()
     assert times["seconds"] == 2.25
     assert datetime.fromisoformat(str(times["started"])).utcoffset() is not None
+
+
+def test_duration_is_that_of_the_run_however_late_it_is_saved(monkeypatch):
+    monkeypatch.setattr("orchestrator.runs.result.monotonic", iter([5.0, 7.25]).__next__)
+    clock = Stopwatch()
+    clock.stop()
+    assert [pickle.loads(pickle.dumps(clock)).times()["seconds"] for _ in range(2)] == [2.25, 2.25]
