@@ -65,6 +65,9 @@ FILES = (*TABLES, METRICS, RECORD)
 #: Packages whose versions a result depends on.
 RECORDED_PACKAGES = (*PACKAGES, "matplotlib")
 
+#: Methods of a table that only a run needs.
+_FILLING = {"begin", "take", "end", "hold", "of"}
+
 #: Messages about a file that cannot be read.
 _NOT_A_RECORD, _NOT_INDICES = "not the record of a run", "not the indices of a run"
 
@@ -109,9 +112,10 @@ class Parameters(Mapping[Any, Any]):
 class Result(Table):
     """The table of a run, with its indices and figures.
 
-    `result["plant.eta.x"]` is a column as a numpy array; an unknown name is a KeyError with a
-    suggestion. `result.time` holds the times, `result.columns` the names of all columns,
-    `result.failure` why the run ended early, or None.
+    `result["plant.eta.x"]` is a column as a numpy array, `result["plant.eta"]` the columns of a
+    group side by side, (rows, columns); an unknown name is a KeyError with a suggestion.
+    `result.time` holds the times, `result.columns` the names of all columns, `result.units` their
+    units, `result.failure` why the run ended early, or None. It can be pickled and copied.
 
     Attributes:
         resumed_at: when it continued from a checkpoint [s]; None: it was not resumed.
@@ -137,6 +141,10 @@ class Result(Table):
             f"<Result {self._scenario.name}: {len(self)} rows of {len(self.columns)} "
             f"columns, {first:g} to {last:g} s, {order}{end}>"
         )
+
+    def __dir__(self) -> list[str]:
+        """Leave out the methods with which a run fills it."""
+        return sorted({*super().__dir__()} - _FILLING)
 
     def _repr_html_(self) -> str:
         """Show the indices in a notebook."""
@@ -190,6 +198,8 @@ class Result(Table):
     def to_dataframe(self) -> pd.DataFrame:
         """Return all columns as a pandas DataFrame, with the time as its index.
 
+        Its `attrs` hold the scenario, the experiment, the failure and the units, as in JSON.
+
         Raises:
             ImportError: pandas is not installed.
 
@@ -203,6 +213,13 @@ class Result(Table):
         for place, name in enumerate(self.columns):
             if name in self.header.types:
                 frame.isetitem(place, self[name])
+        experiment = vars(self.header.experiment)
+        frame.attrs = {
+            "scenario": self._scenario.name,
+            "experiment": json.loads(json.dumps(experiment)),
+            "failure": self.failure,
+            "units": self.units,
+        }
         return frame
 
     def plot(self, *what: str | Result) -> Figure:

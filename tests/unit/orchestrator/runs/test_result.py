@@ -241,8 +241,12 @@ def test_notebook_shows_the_indices_with_all_texts_escaped(title):
 
 
 def test_unknown_names_are_key_errors_with_a_suggestion(result):
-    with pytest.raises(KeyError, match=r"plant\.eta\.x"):
-        result["plant.eta"]
+    with pytest.raises(
+        KeyError, match=r"no column or group 'plant\.etta'; did you mean plant\.eta"
+    ):
+        result["plant.etta"]
+    with pytest.raises(KeyError, match="0"):
+        result[0]
     with pytest.raises(KeyError, match=r"controller\.k_d"):
         result.parameters["controller.kd"]
     with pytest.raises(ValueError, match="no column matches"):
@@ -282,6 +286,38 @@ def test_dataframe_has_the_time_as_its_index(result):
     assert np.array_equal(frame["plant.y.x"], result["plant.y.x"])
     frame.iloc[:] = 0.0
     assert result["plant.eta.x"][0] == 2.0
+
+
+def test_dataframe_has_units_scenario_and_experiment_as_in_json(result, tmp_path):
+    pytest.importorskip("pandas", reason="needs the extra `docs`")
+    order = ("disturbance", "plant", "planner", "controller")
+    for made in (result, simulate("fig4", stop_time=0.1, order=order)):
+        attributes = made.to_dataframe().attrs
+        assert json.loads(json.dumps(attributes, allow_nan=False)) == attributes
+        assert (attributes["scenario"], attributes["failure"]) == ("fig4", None)
+        assert attributes["experiment"]["stop_time"] == 0.1
+        assert attributes["units"]["plant.tau.q"] == "N.m"
+
+
+def test_units_are_those_of_the_fmus(result, tmp_path):
+    """Of every column, also after a result is stored."""
+    stated = {
+        f"{name}.{variable.name}": variable.unit or ""
+        for name, component in result.system.components.items()
+        for variable in component.variables.values()
+    }
+    assert result.units == {"time": "s"} | {name: stated[name] for name in result.columns}
+    assert result.units["plant.eta.psi"] == "rad" and result.units["plant.fault"] == ""
+    assert read(result.save(tmp_path)).units == result.units
+
+
+def test_names_in_an_editor_are_those_that_a_user_needs(result):
+    assert {"metrics", "plot", "units", "keys"} <= {*dir(result)}
+    assert not {"begin", "take", "end", "hold", "of"} & {*dir(result)}
+    completions = result._ipython_key_completions_()
+    assert {"time", "plant.eta", "plant.eta.x", "controller.theta_hat"} <= {*completions}
+    assert all(name in result for name in completions)
+    assert result["plant.eta"].shape == (6, 6)
 
 
 # The record
