@@ -449,7 +449,7 @@ class Table:
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a column: texts of a String, integers of 64 bits, else doubles.
 
-        The name of a group, such as `plant.eta`, or a pattern, such as `plant.eta.*`, gives its
+        The name of a group, such as `arm.joint`, or a pattern, such as `arm.joint[*]`, gives its
         columns side by side, in their order: (rows, columns).
 
         Raises:

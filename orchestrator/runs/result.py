@@ -43,10 +43,13 @@ from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import read_columns, read_rows
 from orchestrator.vehicle.indices import (
+    INDICES,
     SMALLEST_DISTANCE,
     SMALLEST_DISTANCE_LABEL,
+    VEHICLES,
     metrics,
     metrics_of,
+    numbers_of,
     of_vehicles,
 )
 from orchestrator.vehicle.signals import STANDARD, Loop, loop_of
@@ -67,6 +70,12 @@ RECORDED_PACKAGES = (*PACKAGES, "matplotlib")
 
 #: Methods of a table that only a run needs.
 _FILLING = {"begin", "take", "end", "hold", "of"}
+
+#: Names beside indices in metrics.json, in tables of studies and in their figures.
+_TAKEN = {
+    SMALLEST_DISTANCE, VEHICLES, "caution", "failed", "failure", "lost", "order", "parameters",
+    "run", "saturated", "scenario", "step", "stop_time", "time", "velocities_reaching_controller",
+}  # fmt: skip
 
 #: Messages about a file that cannot be read.
 _NOT_A_RECORD, _NOT_INDICES = "not the record of a run", "not the indices of a run"
@@ -187,8 +196,29 @@ class Result(Table):
         """Events that happened during the run: each has a time [s], a text and a label."""
         return self.ending.events
 
-    def metrics(self) -> dict[str, Any]:
-        """Return the indices, as in metrics.json."""
+    def metrics(
+        self, indices: Mapping[str, Callable[[Result], object]] | None = None
+    ) -> dict[str, Any]:
+        """Return the indices, as in metrics.json.
+
+            result.metrics({"deepest": lambda result: result["plant.eta.z"].max()})["deepest"]
+
+        Args:
+            indices: your own by their names: functions of the result, which return a number, or a
+                list or dictionary of numbers; as for :func:`.sweep`.
+
+        Raises:
+            ValueError: an index has the name of another, or returns something else.
+
+        """
+        own = indices or {}
+        for name, function in own.items():
+            check_function(name, function)
+        return self._metrics() | {
+            name: numbers_of(name, function(self)) for name, function in own.items()
+        }
+
+    def _metrics(self) -> dict[str, Any]:
         if self._prepared is None:
             # The stored table may have fewer rows and columns than the run.
             return read_metrics(locate(self._file.with_name(METRICS)))
@@ -308,6 +338,22 @@ class Result(Table):
 
     def _drawn(self) -> Drawn:
         return Drawn(self._scenario.legend, self, self._scenario.z_up, self._loops)
+
+
+def check_function(name: str, function: object) -> None:
+    """Check that a user's function can be an index of a name.
+
+    Raises:
+        InputError: it is not a function, or there is another meaning of the name.
+
+    """
+    taken = {index.name for index in INDICES} | _TAKEN
+    if not name.isidentifier():
+        raise InputError(f"index {name!r}: a name has letters, digits and _")
+    if name in taken:
+        raise InputError(f"index {name}: the name is taken; choose another")
+    if not callable(function):
+        raise InputError(f"index {name}: {function!r} is not a function of a result")
 
 
 def read(path: str | Path) -> Result:

@@ -16,6 +16,8 @@ from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.machine.user_files import read_archive
 from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.result import Result
+from orchestrator.studies.own_functions import OwnFunction
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import Caution, Watch, cautions, values_of
 from orchestrator.vehicle.indices import Indices
@@ -71,12 +73,26 @@ def kinds_of(cautions: Iterable[Caution]) -> str | None:
     return ", ".join(dict.fromkeys(caution.kind for caution in cautions)) or None
 
 
+def with_functions(outcome: Outcome, functions: Sequence[OwnFunction], result: Result) -> Outcome:
+    """Return an outcome with the numbers of functions, or with the failure of one."""
+    values = dict(outcome.indices)
+    try:
+        for function in functions:
+            values |= function.values(result)
+    except InputError as error:
+        return outcome._replace(indices={}, failure=str(error))
+    return outcome._replace(indices=values)
+
+
 class Engine(Protocol):
     """Makes runs.
 
     An engine is pickled and sent to workers with everything that it needs, including FMUs, since
     workers need not share a file system with the sender. Workers keep what they unpack or compile.
     """
+
+    #: The user's own indices that are functions.
+    functions: Sequence[OwnFunction]
 
     @property
     def digest(self) -> str:
@@ -96,6 +112,7 @@ class FmuEngine:
         prepared: Mapping[str, Prepared],
         loop: str = Plan.LOOPS[0],
         own: Sequence[OwnIndex] = (),
+        functions: Sequence[OwnFunction] = (),
     ) -> None:
         """Make an engine.
 
@@ -103,9 +120,11 @@ class FmuEngine:
             prepared: runs by the names of their scenarios.
             loop: that makes the steps, one of :attr:`.Plan.LOOPS`.
             own: the user's own indices.
+            functions: those that are functions.
 
         """
         self._prepared, self._loop, self._own = dict(prepared), loop, own
+        self.functions = functions
 
     @property
     def digest(self) -> str:
@@ -136,8 +155,9 @@ class FmuEngine:
         loops = loops_of(system)
         own = [*chain(*(file.indices for file in self._own))]
         indices, watch = Indices(loops, own=own), Watch(loops)
-        plan = make_plan(system, experiment, loop=self._loop)
-        ending = replace(prepared, plan=plan).run([indices, watch])
+        run = replace(prepared, plan=make_plan(system, experiment, loop=self._loop))
+        result = Result(run.scenario, loops, run)
+        ending = run.run([indices, watch, *([result] if self.functions else [])])
         if ending.interrupts:
             raise KeyboardInterrupt
         kinds = kinds_of([*cautions(values_of(system), point.step, loops), *watch.found()])
@@ -146,7 +166,7 @@ class FmuEngine:
         values = indices.values()
         if failures := indices.failures:
             return Outcome(point.number, {}, f"index {failures[0]}", kinds)
-        return Outcome(point.number, values, None, kinds)
+        return with_functions(Outcome(point.number, values, None, kinds), self.functions, result)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state, in which each system has its FMUs.
