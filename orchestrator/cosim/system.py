@@ -249,7 +249,7 @@ class System:
         return {**self.__dict__, _ARCHIVES: (process_folder(), archives)}
 
     def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Write FMUs that are not in their places into the temporary folder of this process."""
+        """Write missing FMUs into the temporary folder of this process."""
         content = dict(state)
         temporary, archives = content.pop(_ARCHIVES)
         parts = content["components"]

@@ -47,7 +47,7 @@ _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.I)
 #: Longest name [bytes], which leaves room for suffixes.
 _LONGEST = 120
 
-#: Priority of what is done last at the end of a process.
+#: Priority of a task that is the last of a process.
 _LAST = -100
 
 #: Threads must not make a temporary folder each; reentrant, since a signal handler may need it.

@@ -1,4 +1,4 @@
-"""The user's own indices that are functions of a result, and what they are made of."""
+"""The user's own indices that are functions of a result."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class OwnFunction:
 
     @property
     def digest(self) -> str:
-        """Hash of what the function is made of, and of its columns."""
+        """Hash of the function and its columns."""
         content = [*_made_of(self.function, None, []), *self.columns]
         return sha256("\0".join(content).encode(errors="surrogatepass")).hexdigest()
 
     def with_columns(self, outcome: Mapping[str, float]) -> Self:
-        """Return the index with its columns among those of a run."""
+        """Return the index with its columns, found among the numbers of a run."""
         return replace(self, columns=tuple(name for name in outcome if matches(name, self.name)))
 
     def values(self, result: Result) -> dict[str, float]:
@@ -112,7 +112,7 @@ def _has_file() -> bool:
 
 
 def _made_of(value: object, module: str | None, seen: list[FunctionType]) -> Iterator[str]:
-    """Yield what decides the results of a function, as far as it can be seen.
+    """Yield texts that differ if a function is another one.
 
     These are its compiled code, and the values that it uses from its module, from functions around
     it and as defaults; functions of its module count like it, those of other modules do not. Other

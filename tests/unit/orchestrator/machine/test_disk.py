@@ -85,7 +85,7 @@ def test_temporary_folders_of_killed_processes_are_removed_by_the_next(tmp_path:
 
 
 def test_temporary_folders_end_with_their_processes_without_a_warning():
-    """Also those of forked processes, which do not end as others do."""
+    """Forked processes end in another way."""
     script = (
         "from multiprocessing import get_context\n"
         "from orchestrator.machine.disk import process_folder\n"

@@ -299,8 +299,8 @@ def test_dataframe_has_units_scenario_and_experiment_as_in_json(result, tmp_path
         assert attributes["units"]["plant.tau.q"] == "N.m"
 
 
-def test_units_are_those_of_the_fmus(result, tmp_path):
-    """Of every column, also after a result is stored."""
+def test_units_are_as_the_fmus_state_them(result, tmp_path):
+    """A stored result has them, too."""
     stated = {
         f"{name}.{variable.name}": variable.unit or ""
         for name, component in result.system.components.items()
@@ -433,7 +433,7 @@ def test_duration_does_not_depend_on_the_clock(monkeypatch):
     assert datetime.fromisoformat(str(times["started"])).utcoffset() is not None
 
 
-def test_duration_is_that_of_the_run_however_late_it_is_saved(monkeypatch):
+def test_a_run_lasts_as_long_however_late_it_is_saved(monkeypatch):
     monkeypatch.setattr("orchestrator.runs.result.monotonic", iter([5.0, 7.25]).__next__)
     clock = Stopwatch()
     clock.stop()

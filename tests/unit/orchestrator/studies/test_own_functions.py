@@ -26,7 +26,7 @@ def deepest(result: Result) -> float:
 
 
 def of_the_run(result: Result) -> dict[str, float]:
-    """What comes of the table, its parameters and its indices."""
+    """Numbers from the table, its parameters and its indices."""
     return {
         "start": result.parameters["plant.eta0.z"],
         "effort": result.metrics()["l2_effort"][0],
