@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from ctypes import Structure, c_size_t, c_void_p
 from dataclasses import dataclass, field, replace
@@ -26,9 +27,10 @@ from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.system import System
 from orchestrator.cosim.variables import TYPES, Standing, StringTable, as_float32
-from orchestrator.machine.errors import InputError, did_you_mean, unforeseen
+from orchestrator.machine.errors import InputError, did_you_mean, listed, unforeseen
 from orchestrator.machine.lazy import ROWS_AT_ONCE, parquet
 from orchestrator.machine.operating_system import is_still
+from orchestrator.machine.texts import matches
 
 #: Rows in a block, and the longest time for which rows wait [s].
 _ROWS, _PATIENCE = 512, 0.2
@@ -378,6 +380,9 @@ class Selection:
         self._observer.end(ending)
 
 
+#: Characters between the names of a group and of its members.
+_MARKS = re.compile(r"[.\[]")
+
 #: Largest number of rows in memory.
 MOST_ROWS = 10_000_000
 
@@ -441,26 +446,59 @@ class Table:
         """Keep the ending."""
         self.ending = ending
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state with the rows that were taken, without the room for others."""
+        return {**self.__dict__, "_rows": self.rows}
+
     def __len__(self) -> int:
         """Return the number of rows."""
         return self._n
 
-    def __contains__(self, column: str) -> bool:
-        """Return True for a column `component.port`."""
-        return column == "time" or column in self.header.place
+    def __contains__(self, name: object) -> bool:
+        """Return True for a column, for `time`, and for a group or pattern of columns."""
+        return name == "time" or name in self.header.place or bool(self._members(name))
 
-    def __getitem__(self, column: str) -> np.ndarray:
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the columns, without the time."""
+        return iter(self.columns)
+
+    def keys(self) -> tuple[str, ...]:
+        """Return the names of the columns, without the time."""
+        return self.columns
+
+    def __getitem__(self, name: str) -> np.ndarray:
         """Return a column: texts of a String, integers of 64 bits, else doubles.
 
+        The name of a group, such as `arm.joint`, or a pattern, such as `arm.joint[*]`, gives its
+        columns side by side, in their order: (rows, columns).
+
         Raises:
-            KeyError: there is no such column; the text has a suggestion.
+            KeyError: there is no such column or group; the text has a suggestion.
 
         """
-        if column == "time":
+        if name == "time":
             return self.time
-        if column not in self.header.place:
-            raise KeyError(f"no column {column!r}{did_you_mean(str(column), self.header.place)}")
-        return self.header.values(column, self.rows)
+        if name in self.header.place:
+            return self.header.values(name, self.rows)
+        if members := self._members(name):
+            return self.group(*members)
+        hint = did_you_mean(str(name), (*self.columns, *self._groups))
+        raise KeyError(f"no column or group {name!r}{hint}")
+
+    def _members(self, name: object) -> list[str]:
+        """Return the columns of a group or pattern; none: there is no such group."""
+        if not isinstance(name, str):
+            return []
+        return [column for column in self.columns if matches(column, name)]
+
+    @property
+    def _groups(self) -> list[str]:
+        """The names of all groups."""
+        names = (name[: mark.start()] for name in self.columns for mark in _MARKS.finditer(name))
+        return [*dict.fromkeys(names)]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return ["time", *self.columns, *self._groups]
 
     @property
     def rows(self) -> np.ndarray:
@@ -478,6 +516,11 @@ class Table:
         return self.header.columns
 
     @property
+    def units(self) -> dict[str, str]:
+        """Units of the time and of all columns, as the FMUs write them; empty without a unit."""
+        return {"time": "s"} | {name: self.header.units.get(name, "") for name in self.columns}
+
+    @property
     def parameters(self) -> Mapping[PortName, Any]:
         """Parameters of all components, as the FMUs report them after initialisation."""
         return self.header.parameters
@@ -488,13 +531,22 @@ class Table:
         return self.ending.failure
 
     def group(self, *columns: str) -> np.ndarray:
-        """Return several columns side by side, (rows, columns)."""
-        return np.column_stack([self[column] for column in columns])
+        """Return several columns, groups or patterns side by side, (rows, columns).
+
+        Raises:
+            InputError: some are texts and others numbers.
+
+        """
+        values = [self[column] for column in columns]
+        if len({each.dtype.kind == "U" for each in values}) > 1:
+            raise InputError(f"{listed(columns)}: are texts and numbers; take them one by one")
+        return np.column_stack(values)
 
     def missing(self, columns: Iterable[str], parameters: Iterable[str] = ()) -> list[str]:
         """Return the columns and parameters, `component.name`, that the table lacks."""
         known = self.header.parameter_names
-        return [column for column in columns if column not in self] + [
+        place = self.header.place
+        return [column for column in columns if column != "time" and column not in place] + [
             name for name in parameters if name not in known
         ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
 from fractions import Fraction
@@ -26,9 +27,10 @@ from orchestrator.cosim.connection import (
 )
 from orchestrator.cosim.experiment import MOST_STEPS, Experiment, Order
 from orchestrator.cosim.variables import TYPES, Value, Variable
-from orchestrator.machine.disk import plain_file_names
+from orchestrator.machine.disk import plain_file_names, process_folder
 from orchestrator.machine.errors import InputError, did_you_mean, listed
 from orchestrator.machine.texts import is_finite
+from orchestrator.machine.user_files import read_archive
 
 #: For each component, the components whose direct feedthrough feeds it.
 Sources = Mapping[str, Collection[str]]
@@ -197,6 +199,9 @@ STAR = "*"
 #: Largest quotient of the smallest step and a common divisor of all steps.
 _MOST_PARTS = 1000
 
+#: Key of the FMUs in a pickled system.
+_ARCHIVES = "archives"
+
 #: Characters between the names of a group and of its members.
 _MEMBER = (".", "[")
 
@@ -230,6 +235,33 @@ class System:
     def __repr__(self) -> str:
         """One line: a system's descriptions are long."""
         return f"<System {self.name}: {', '.join(self.components)}>"
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state with the unchanged FMUs, each once, by their digests.
+
+        Another machine has no such files, and those in our temporary folder end with this process.
+        """
+        archives: dict[str, bytes] = {}
+        for part in self.components.values():
+            if part.digest not in archives:
+                with suppress(InputError):
+                    archives[part.digest] = read_archive(part.fmu, part.digest)
+        return {**self.__dict__, _ARCHIVES: (process_folder(), archives)}
+
+    def __setstate__(self, state: Mapping[str, Any]) -> None:
+        """Write missing FMUs into the temporary folder of this process."""
+        content = dict(state)
+        temporary, archives = content.pop(_ARCHIVES)
+        parts = content["components"]
+        places = {
+            part.fmu: _place(part.fmu, part.digest, archives[part.digest], temporary)
+            for part in parts.values()
+            if part.digest in archives
+        }
+        content["components"] = {
+            name: replace(part, fmu=places.get(part.fmu, part.fmu)) for name, part in parts.items()
+        }
+        self.__dict__.update(content)
 
     def with_parameters(self, values: Values) -> System:
         """Return the system with further values, which replace its own.
@@ -780,6 +812,28 @@ class System:
             steps={name_of(name): step for name, step in self.steps.items()},
             left_open={port_of(port) for port in self.left_open},
         )
+
+
+def _place(fmu: Path, digest: str, content: bytes, temporary: Path) -> Path:
+    """Return the path of an FMU that another process has read, which is written if need be.
+
+    Args:
+        fmu: its path there.
+        digest: of its content.
+        content: of the file.
+        temporary: folder that ends with the other process.
+
+    """
+    own = process_folder()
+    if temporary == own or temporary not in fmu.parents:
+        with suppress(InputError):
+            read_archive(fmu, digest)
+            return fmu
+    path = own / digest / fmu.name
+    if not path.exists():
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(content)
+    return path
 
 
 def _could_feed(source: Component, variable: Variable) -> bool:

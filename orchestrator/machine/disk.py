@@ -15,6 +15,7 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from hashlib import file_digest, sha256
 from itertools import count
+from multiprocessing.util import Finalize
 from pathlib import Path
 from shutil import rmtree
 from stat import S_ISDIR
@@ -45,6 +46,9 @@ _RESERVED = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\.|$)", re.I)
 
 #: Longest name [bytes], which leaves room for suffixes.
 _LONGEST = 120
+
+#: Priority of a task that is the last of a process.
+_LAST = -100
 
 #: Threads must not make a temporary folder each; reentrant, since a signal handler may need it.
 _MAKING = RLock()
@@ -231,6 +235,10 @@ def _process_folder() -> TemporaryDirectory[str]:
     _remove_left()
     folder = TemporaryDirectory(prefix=_PREFIX, ignore_cleanup_errors=True)
     path = Path(folder.name)
+    # Else Python removes it with a warning.
+    atexit.register(folder.cleanup)
+    # Forked processes end without atexit.
+    Finalize(None, folder.cleanup, exitpriority=_LAST)
     # If no marker can be written, no other process will remove it.
     with suppress(OSError):
         lock = _lock_of(path)

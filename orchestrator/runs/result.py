@@ -43,10 +43,13 @@ from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import read_columns, read_rows
 from orchestrator.vehicle.indices import (
+    INDICES,
     SMALLEST_DISTANCE,
     SMALLEST_DISTANCE_LABEL,
+    VEHICLES,
     metrics,
     metrics_of,
+    numbers_of,
     of_vehicles,
 )
 from orchestrator.vehicle.signals import STANDARD, Loop, loop_of
@@ -64,6 +67,15 @@ FILES = (*TABLES, METRICS, RECORD)
 
 #: Packages whose versions a result depends on.
 RECORDED_PACKAGES = (*PACKAGES, "matplotlib")
+
+#: Methods of a table that only a run needs.
+_FILLING = {"begin", "take", "end", "hold", "of"}
+
+#: Names beside indices in metrics.json, in tables of studies and in their figures.
+_TAKEN = {
+    SMALLEST_DISTANCE, VEHICLES, "caution", "failed", "failure", "lost", "order", "parameters",
+    "run", "saturated", "scenario", "step", "stop_time", "time", "velocities_reaching_controller",
+}  # fmt: skip
 
 #: Messages about a file that cannot be read.
 _NOT_A_RECORD, _NOT_INDICES = "not the record of a run", "not the indices of a run"
@@ -109,9 +121,10 @@ class Parameters(Mapping[Any, Any]):
 class Result(Table):
     """The table of a run, with its indices and figures.
 
-    `result["plant.eta.x"]` is a column as a numpy array; an unknown name is a KeyError with a
-    suggestion. `result.time` holds the times, `result.columns` the names of all columns,
-    `result.failure` why the run ended early, or None.
+    `result["plant.eta.x"]` is a column as a numpy array, `result["plant.eta"]` the columns of a
+    group side by side, (rows, columns); an unknown name is a KeyError with a suggestion.
+    `result.time` holds the times, `result.columns` the names of all columns, `result.units` their
+    units, `result.failure` why the run ended early, or None. It can be pickled and copied.
 
     Attributes:
         resumed_at: when it continued from a checkpoint [s]; None: it was not resumed.
@@ -138,6 +151,10 @@ class Result(Table):
             f"columns, {first:g} to {last:g} s, {order}{end}>"
         )
 
+    def __dir__(self) -> list[str]:
+        """Leave out the methods with which a run fills it."""
+        return sorted({*super().__dir__()} - _FILLING)
+
     def _repr_html_(self) -> str:
         """Show the indices in a notebook."""
         rows = []
@@ -151,6 +168,11 @@ class Result(Table):
             f"<div><b>{title}</b><br><code>{escape(repr(self))}</code>"
             f"<table>{''.join(rows)}</table></div>"
         )
+
+    def end(self, ending: Ending) -> None:
+        """Keep the ending and the duration."""
+        super().end(ending)
+        self._clock.stop()
 
     @cached_property
     def parameters(self) -> Parameters:
@@ -174,8 +196,29 @@ class Result(Table):
         """Events that happened during the run: each has a time [s], a text and a label."""
         return self.ending.events
 
-    def metrics(self) -> dict[str, Any]:
-        """Return the indices, as in metrics.json."""
+    def metrics(
+        self, indices: Mapping[str, Callable[[Result], object]] | None = None
+    ) -> dict[str, Any]:
+        """Return the indices, as in metrics.json.
+
+            result.metrics({"deepest": lambda result: result["plant.eta.z"].max()})["deepest"]
+
+        Args:
+            indices: your own by their names: functions of the result, which return a number, or a
+                list or dictionary of numbers; as for :func:`.sweep`.
+
+        Raises:
+            ValueError: an index has the name of another, or returns something else.
+
+        """
+        own = indices or {}
+        for name, function in own.items():
+            check_function(name, function)
+        return self._metrics() | {
+            name: numbers_of(name, function(self)) for name, function in own.items()
+        }
+
+    def _metrics(self) -> dict[str, Any]:
         if self._prepared is None:
             # The stored table may have fewer rows and columns than the run.
             return read_metrics(locate(self._file.with_name(METRICS)))
@@ -184,6 +227,8 @@ class Result(Table):
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return all columns as a pandas DataFrame, with the time as its index.
+
+        Its `attrs` hold the scenario, the experiment, the failure and the units, as in JSON.
 
         Raises:
             ImportError: pandas is not installed.
@@ -198,6 +243,13 @@ class Result(Table):
         for place, name in enumerate(self.columns):
             if name in self.header.types:
                 frame.isetitem(place, self[name])
+        experiment = vars(self.header.experiment)
+        frame.attrs = {
+            "scenario": self._scenario.name,
+            "experiment": json.loads(json.dumps(experiment)),
+            "failure": self.failure,
+            "units": self.units,
+        }
         return frame
 
     def plot(self, *what: str | Result) -> Figure:
@@ -288,6 +340,22 @@ class Result(Table):
         return Drawn(self._scenario.legend, self, self._scenario.z_up, self._loops)
 
 
+def check_function(name: str, function: object) -> None:
+    """Check that a user's function can be an index of a name.
+
+    Raises:
+        InputError: it is not a function, or there is another meaning of the name.
+
+    """
+    taken = {index.name for index in INDICES} | _TAKEN
+    if not name.isidentifier():
+        raise InputError(f"index {name!r}: a name has letters, digits and _")
+    if name in taken:
+        raise InputError(f"index {name}: the name is taken; choose another")
+    if not callable(function):
+        raise InputError(f"index {name}: {function!r} is not a function of a result")
+
+
 def read(path: str | Path) -> Result:
     """Read a result that `auv-fmu run` or :meth:`Result.save` has written.
 
@@ -342,13 +410,17 @@ class Stopwatch:
     def __init__(self) -> None:
         """Start now."""
         self._started = datetime.now(UTC)
-        self._tick = monotonic()
+        self._tick, self._end = monotonic(), 0.0
+
+    def stop(self) -> None:
+        """End the run."""
+        self._end = monotonic()
 
     def times(self) -> dict[str, object]:
         """Return the entries of a record."""
         return {
             "started": self._started.isoformat(timespec="seconds"),
-            "seconds": round(monotonic() - self._tick, 3),
+            "seconds": round((self._end or monotonic()) - self._tick, 3),
         }
 
 

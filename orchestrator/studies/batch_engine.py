@@ -21,7 +21,6 @@ from orchestrator.cosim import (
     Order,
     PortName,
     System,
-    Table,
     Value,
     make_plan,
 )
@@ -30,8 +29,12 @@ from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
 from orchestrator.program.library import Program, Source
 from orchestrator.program.writer import Text, indices_of
+from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import PROGRAM
-from orchestrator.studies.engine import Outcome, Point, kinds_of
+from orchestrator.runs.result import Result
+from orchestrator.runs.scenario import Scenario
+from orchestrator.studies.engine import Outcome, Point, kinds_of, with_functions
+from orchestrator.studies.own_functions import OwnFunction
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import (
     WATCHED,
@@ -221,6 +224,21 @@ class _Programs:
             [rows[:, [places[name] for name in loop.position]] for loop in self.loops], axis=1
         )
 
+    def result(
+        self, compiled: _Compiled, point: Point, experiment: Experiment, rows: np.ndarray
+    ) -> Result:
+        """Return the result of a run, as :func:`.simulate` does."""
+        system = self.system.with_parameters(point.parameters)
+        plan = make_plan(system, experiment)
+        columns = [system.named(PortName.read(name)) for name in compiled.source.columns]
+        # The order of systems of the language where none is stated.
+        ordered = replace(experiment, order=experiment.order or "feedthrough")
+        header = Header.of(system, ordered, columns, PROGRAM)
+        scenario = Scenario(point.scenario)
+        result = Result(scenario, self.loops, Prepared(scenario, plan))
+        result.hold(header, rows, Ending())
+        return result
+
     def cautions(self, compiled: _Compiled, point: Point, numbers: Sequence[float]) -> str | None:
         """Return the kinds of cautions of a run."""
 
@@ -265,17 +283,24 @@ def _number(parameter: _Parameter, value: Any) -> float:
 class BatchEngine:
     """Makes runs by compiled programs."""
 
-    def __init__(self, systems: Mapping[str, System], own: Sequence[OwnIndex] = ()) -> None:
+    def __init__(
+        self,
+        systems: Mapping[str, System],
+        own: Sequence[OwnIndex] = (),
+        functions: Sequence[OwnFunction] = (),
+    ) -> None:
         """Make an engine.
 
         Args:
             systems: by the names of scenarios in runs.
             own: the user's own indices.
+            functions: those that are functions.
 
         Raises:
             InputError: a system cannot become a program.
 
         """
+        self.functions = functions
         self._programs = dict[str, _Programs]()
         for name, system in systems.items():
             system.check()
@@ -320,19 +345,26 @@ class BatchEngine:
         except Refusal:
             return Outcome(point.number, {}, REFUSED)
         is_fleet = len(programs.loops) > 1
-        rows = np.empty((experiment.rows, 1 + len(compiled.source.columns))) if is_fleet else None
+        rows = None
+        if is_fleet or self.functions:
+            rows = np.empty((experiment.rows, 1 + len(compiled.source.columns)))
         results = compiled.program.run(values, experiment, rows)
         if results is None:
             return Outcome(point.number, {}, REFUSED)
         numbers = results.tolist()
         indices: dict[str, float] = {}
-        if rows is not None:
+        if is_fleet and rows is not None:
             distances = smallest_of(programs.positions(compiled, rows))
             indices[SMALLEST_DISTANCE] = float(distances.min())
         indices |= compiled.indices(numbers)
-        return Outcome(point.number, indices, None, programs.cautions(compiled, point, numbers))
+        outcome = Outcome(point.number, indices, None, programs.cautions(compiled, point, numbers))
+        if rows is None or not self.functions:
+            return outcome
+        return with_functions(
+            outcome, self.functions, programs.result(compiled, point, experiment, rows)
+        )
 
-    def table(self, point: Point) -> Table:
+    def table(self, point: Point) -> Result:
         """Make a run and return its rows.
 
         Raises:
@@ -349,10 +381,7 @@ class BatchEngine:
             raise InputError(str(refusal)) from None
         if compiled.program.run(values, experiment, rows) is None:
             raise InputError(f"{point.scenario}: a component has refused")
-        system = programs.system.with_parameters(point.parameters)
-        columns = [system.named(PortName.read(name)) for name in compiled.source.columns]
-        header = Header.of(system, experiment, columns, PROGRAM)
-        return Table.of(header, rows, Ending())
+        return programs.result(compiled, point, experiment, rows)
 
 
 _experiments: Callable[..., Experiment] = lru_cache(Experiment)

@@ -7,16 +7,19 @@ Dask cluster (:mod:`.cluster`). If a worker dies, another one repeats its block.
 from __future__ import annotations
 
 import os
+import pickle
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
+from pathlib import Path
 from threading import Event
 from time import monotonic
 from typing import NamedTuple, Protocol
 
+from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.machine.workers import Workers, cores
@@ -86,16 +89,19 @@ def local_workers(n: int | None, engine: Engine) -> Iterator[BlockWorkers]:
         InputError: none can be started.
 
     """
-    with workers_of(n, partial(_set_up, engine)) as workers:
-        try:
-            workers.done([first := workers.submit(bool)])
-            first.result()
-        except BrokenProcessPool:
-            raise InputError(
-                "no process can be started (a script needs `if __name__ == '__main__':` around "
-                "what it does)"
-            ) from None
-        yield _Local(workers, _task)
+    with temporary_folder() as folder:
+        # In a file, since a process that ends at once would never read it from a pipe.
+        (file := folder / "engine").write_bytes(pickle.dumps(engine))
+        with workers_of(n, partial(_set_up, file)) as workers:
+            try:
+                workers.done([first := workers.submit(bool)])
+                first.result()
+            except BrokenProcessPool:
+                raise InputError(
+                    "no process can be started (a script needs `if __name__ == '__main__':` around "
+                    "what it does)"
+                ) from None
+            yield _Local(workers, _task)
 
 
 class _Sent(NamedTuple):
@@ -163,8 +169,8 @@ def local_threads(n: int | None, engine: Engine) -> Iterator[BlockWorkers]:
             threads.close()
 
 
-def _set_up(engine: Engine) -> None:
-    _engine.append(engine)
+def _set_up(file: Path) -> None:
+    _engine.append(pickle.loads(file.read_bytes()))
     # FMUs must not print to the terminal of the study.
     for stream in (1, 2):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)

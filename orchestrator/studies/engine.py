@@ -9,15 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from orchestrator.cosim import Order, Plan, PortName, make_plan
-from orchestrator.machine.disk import process_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.machine.user_files import read_archive
 from orchestrator.runs.preparation import Prepared
+from orchestrator.runs.result import Result
+from orchestrator.studies.own_functions import OwnFunction
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import Caution, Watch, cautions, values_of
 from orchestrator.vehicle.indices import Indices
@@ -73,12 +73,26 @@ def kinds_of(cautions: Iterable[Caution]) -> str | None:
     return ", ".join(dict.fromkeys(caution.kind for caution in cautions)) or None
 
 
+def with_functions(outcome: Outcome, functions: Sequence[OwnFunction], result: Result) -> Outcome:
+    """Return an outcome with the numbers of functions, or with the failure of one."""
+    values = dict(outcome.indices)
+    try:
+        for function in functions:
+            values |= function.values(result)
+    except InputError as error:
+        return outcome._replace(indices={}, failure=str(error))
+    return outcome._replace(indices=values)
+
+
 class Engine(Protocol):
     """Makes runs.
 
     An engine is pickled and sent to workers with everything that it needs, including FMUs, since
     workers need not share a file system with the sender. Workers keep what they unpack or compile.
     """
+
+    #: The user's own indices that are functions.
+    functions: Sequence[OwnFunction]
 
     @property
     def digest(self) -> str:
@@ -98,6 +112,7 @@ class FmuEngine:
         prepared: Mapping[str, Prepared],
         loop: str = Plan.LOOPS[0],
         own: Sequence[OwnIndex] = (),
+        functions: Sequence[OwnFunction] = (),
     ) -> None:
         """Make an engine.
 
@@ -105,9 +120,11 @@ class FmuEngine:
             prepared: runs by the names of their scenarios.
             loop: that makes the steps, one of :attr:`.Plan.LOOPS`.
             own: the user's own indices.
+            functions: those that are functions.
 
         """
         self._prepared, self._loop, self._own = dict(prepared), loop, own
+        self.functions = functions
 
     @property
     def digest(self) -> str:
@@ -138,8 +155,9 @@ class FmuEngine:
         loops = loops_of(system)
         own = [*chain(*(file.indices for file in self._own))]
         indices, watch = Indices(loops, own=own), Watch(loops)
-        plan = make_plan(system, experiment, loop=self._loop)
-        ending = replace(prepared, plan=plan).run([indices, watch])
+        run = replace(prepared, plan=make_plan(system, experiment, loop=self._loop))
+        result = Result(run.scenario, loops, run)
+        ending = run.run([indices, watch, *([result] if self.functions else [])])
         if ending.interrupts:
             raise KeyboardInterrupt
         kinds = kinds_of([*cautions(values_of(system), point.step, loops), *watch.found()])
@@ -148,38 +166,16 @@ class FmuEngine:
         values = indices.values()
         if failures := indices.failures:
             return Outcome(point.number, {}, f"index {failures[0]}", kinds)
-        return Outcome(point.number, values, None, kinds)
+        return with_functions(Outcome(point.number, values, None, kinds), self.functions, result)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the state with the content of the FMUs, each once, by their hashes.
+        """Return the state, in which each system has its FMUs.
 
         Raises:
             InputError: one has changed since it was read.
 
         """
-        archives = {
-            part.digest: read_archive(part.fmu, part.digest)
-            for prepared in self._prepared.values()
-            for part in prepared.system.components.values()
-        }
-        state = {"prepared": self._prepared, "loop": self._loop, "own": self._own}
-        return {**state, "archives": archives}
-
-    def __setstate__(self, state: Mapping[str, Any]) -> None:
-        """Write the FMUs into the temporary folder of this process."""
-        self._prepared, self._loop, self._own = {}, state["loop"], state["own"]
-        for name, prepared in state["prepared"].items():
-            components = {
-                part.name: replace(part, fmu=_written(part.digest, state["archives"][part.digest]))
-                for part in prepared.system.components.values()
-            }
-            system = replace(prepared.system, components=components)
-            self._prepared[name] = replace(prepared, plan=replace(prepared.plan, system=system))
-
-
-def _written(digest: str, content: bytes) -> Path:
-    """Write an FMU unless it is there; return its path."""
-    path = process_folder() / f"{digest}.fmu"
-    if not path.exists():
-        path.write_bytes(content)
-    return path
+        for prepared in self._prepared.values():
+            for part in prepared.system.components.values():
+                read_archive(part.fmu, part.digest)
+        return self.__dict__

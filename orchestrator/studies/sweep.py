@@ -24,10 +24,12 @@ from orchestrator.machine.lazy import progress_bar
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.preparation import Prepared, load_scenario
 from orchestrator.runs.request import FORCE, KIND, LOOP, option
+from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.blocks import Blocks, local_threads, local_workers
 from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
+from orchestrator.studies.own_functions import OwnFunction, own_functions
 from orchestrator.studies.own_indices import OwnIndex, own_indices, with_fields
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import Store, StudyResult, open_store, read_study_record
@@ -53,6 +55,9 @@ _STATED = ("vary", "sample", "parameters", "stop_time", "step", "order")
 
 #: Number of runs from which a faster way is suggested.
 _MANY = 100
+
+#: Number of runs that are tried to learn the columns of functions.
+_TRIED = 10
 
 #: Seconds before a progress bar appears.
 _PATIENCE = 2.0
@@ -101,6 +106,7 @@ class Means:
 def sweep(
     study: str | Path | Mapping[str, Any],
     *,
+    indices: Mapping[str, Callable[[Result], object]] | None = None,
     engine: EngineName | None = None,
     kind: KindName = AUTO,
     loop: Plan.Loop = Plan.LOOPS[0],
@@ -117,6 +123,8 @@ def sweep(
 
     Args:
         study: name of a ready study, path of a .toml file, or a dictionary with its entries.
+        indices: your own by their names: functions of the result of a run, which return a number,
+            or a list or dictionary of numbers; :meth:`.Result.metrics` tries them on one result.
         engine: engine that makes the runs, `fmu` or `batch`; None: the study's own.
         kind: kind of the bundle's FMUs: `python`, `native`, or `auto`: the kind with which the
             study began, else native where available.
@@ -136,7 +144,14 @@ def sweep(
     """
     parsed = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
     means = Means(engine, kind, loop, scheduler, workers, force)
-    return complete_study(parsed, means, study_folder(parsed, out), sys.argv, progress=progress)
+    return complete_study(
+        parsed,
+        means,
+        study_folder(parsed, out),
+        sys.argv,
+        progress=progress,
+        functions=own_functions(indices or {}),
+    )
 
 
 def study_folder(study: Study, out: str | Path | None) -> Path:
@@ -151,6 +166,7 @@ def complete_study(
     command: Sequence[str],
     say: Callable[[str], None] = lambda _: None,
     progress: bool = False,
+    functions: Sequence[OwnFunction] = (),
 ) -> StudyResult:
     """Make the missing runs of a study, publish them and draw the figures.
 
@@ -161,6 +177,7 @@ def complete_study(
         command: for the record.
         say: receives notes for the user.
         progress: show a bar.
+        functions: the user's own indices that are functions.
 
     Raises:
         InputError: the study cannot be run, or its files cannot be written.
@@ -172,7 +189,7 @@ def complete_study(
 
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
     kind = _kind_begun(folder) if means.kind == AUTO else means.kind
-    ready = prepare_study(study, replace(means, kind=kind))
+    ready = prepare_study(study, replace(means, kind=kind), functions)
     space, engine = ready.space, ready.engine
     record = _record(study, ready, command)
     with open_store(folder, record, space.indices, means.force) as store:
@@ -183,7 +200,7 @@ def complete_study(
             engines = [engine]
             if isinstance(engine, BatchEngine):
                 # For runs that it refuses, since it gives no reason.
-                engines.append(FmuEngine(space.prepared, means.loop, ready.own))
+                engines.append(FmuEngine(space.prepared, means.loop, ready.own, engine.functions))
             _complete(store, engines, space, ready.means, study.name if progress else None)
         result = StudyResult(folder)
         store.write_record(
@@ -220,8 +237,13 @@ class Ready(NamedTuple):
     own: Sequence[OwnIndex]
 
 
-def prepare_study(study: Study, means: Means) -> Ready:
+def prepare_study(study: Study, means: Means, functions: Sequence[OwnFunction] = ()) -> Ready:
     """Check a study and prepare its runs.
+
+    Args:
+        study: to run.
+        means: options.
+        functions: the user's own indices that are functions; a run shows their columns.
 
     Raises:
         Refused: its runs cannot be made, or its figures cannot be drawn; with all problems.
@@ -237,14 +259,57 @@ def prepare_study(study: Study, means: Means) -> Ready:
     own = own_indices(study, {name: system for name, (_, system) in systems.items()})
     space = Space(study, systems, [*chain(*(file.indices for file in own))])
     with findings.collecting():
+        engine = _engine(means.engine or study.engine, space.prepared, means, own)
+    if functions:
+        findings.refuse()
+        engine.functions = with_columns(functions, space, own, engine, means)
+        space.indices += tuple(chain(*(function.columns for function in engine.functions)))
+    with findings.collecting():
         figures = with_fields(study.figures, own, space.indices)
         entries = read_figures(
             study.name, figures, space.columns, space.has_scenarios, space.indices
         )
-    with findings.collecting():
-        engine = _engine(means.engine or study.engine, space.prepared, means, own)
     findings.refuse()
     return Ready(means, systems, space, entries, engine, own)
+
+
+def with_columns(
+    functions: Sequence[OwnFunction],
+    space: Space,
+    own: Sequence[OwnIndex],
+    engine: Engine,
+    means: Means,
+) -> Sequence[OwnFunction]:
+    """Return functions with their columns, as the first run shows them that does not fail.
+
+    Raises:
+        InputError: a function fails, a column has the name of another, or the first runs fail.
+
+    """
+    engine.functions, failure = functions, None
+    names = tuple(f"index {function.name}: " for function in functions)
+    workers = 1 if means.scheduler is None else None
+    for number in range(min(_TRIED, len(space))):
+        # As all others are made, since an FMU may end its process.
+        with making_runs(
+            engine, [space[number]], scheduler=means.scheduler, workers=workers
+        ) as blocks:
+            [outcome] = chain(*blocks)
+        failure = outcome.failure
+        if failure is None:
+            known = [function.with_columns(outcome.indices) for function in functions]
+            columns = [*chain(*(function.columns for function in known))]
+            taken = {
+                *space.columns,
+                *space.indices,
+                *(index.name for file in own for index in file.indices),
+            }
+            if twice := taken.intersection(columns):
+                raise InputError(f"{min(twice)}: two columns of runs would have this name")
+            return known
+        if failure.startswith(names):
+            raise InputError(failure)
+    raise InputError(f"the columns of indices are unknown, since the first runs fail: {failure}")
 
 
 def _kind_begun(folder: Path) -> KindName:
@@ -324,6 +389,7 @@ def _record(study: Study, ready: Ready, command: Sequence[str]) -> dict[str, Any
     """Return the content of study.json at the start of a study."""
     stated = asdict(study)
     own = {file.name: file.digest for file in ready.own}
+    own |= {function.name: function.digest for function in ready.engine.functions}
     return {
         "study": study.name,
         "title": study.title,

@@ -20,6 +20,7 @@ from auv_fmu.language.quantities import member_of
 from fmus.ports.port import Port
 from fmus.ports.reducer import Reducer, read_reducer
 from orchestrator.cosim import Ending, Header, PortName, System, Table
+from orchestrator.machine.errors import InputError, shortened
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.index import (
     effort,
@@ -174,6 +175,40 @@ def prefixed(loops: Sequence[Loop]) -> Iterator[tuple[Loop, str]]:
     """Yield loops with the prefixes of their columns: with several, the vehicle's name."""
     for loop in loops:
         yield loop, f"{loop.name}." if len(loops) > 1 else ""
+
+
+# The user's functions
+
+#: The value of a user's function of a result.
+Numbers = float | list[float] | dict[str, float]
+
+
+def numbers_of(name: str, value: object) -> Numbers:
+    """Return the value of a user's function as floats.
+
+    Raises:
+        InputError: it is not a number, and not a list or dictionary of numbers.
+
+    """
+    try:
+        if isinstance(value, Mapping):
+            return {str(member): float(number) for member, number in value.items()}
+        number: Any = value
+        return [float(each) for each in number] if np.ndim(number) else float(number)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"index {name}: returned {shortened(repr(value))}; return a number, or a list or "
+            "dictionary of numbers"
+        ) from None
+
+
+def columns_of(name: str, numbers: Numbers) -> dict[str, float]:
+    """Return the numbers of a user's function by their columns in a study."""
+    if isinstance(numbers, dict):
+        return {f"{name}.{member}": number for member, number in numbers.items()}
+    if isinstance(numbers, list):
+        return {f"{name}[{place}]": number for place, number in enumerate(numbers, 1)}
+    return {name: numbers}
 
 
 # Distances between vehicles

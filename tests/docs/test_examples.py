@@ -12,11 +12,12 @@ from importlib.util import find_spec
 from inspect import signature
 from math import isfinite
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from orchestrator import simulate, sweep
+from orchestrator import Result, simulate, sweep
 from orchestrator.commands.main import main
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.preparation import load_scenario
@@ -32,8 +33,8 @@ from support.tiers import slow
 pytestmark = pytest.mark.usefixtures("workplace")
 
 (
-    ACCURACY, BATCH, EVENTS, EXAMPLES, LIBCOSIM, PARAMETERS, PYTHON, SCENARIOS, STEP, STUDIES,
-    TEST_ONE, TRAJECTORIES,
+    ACCURACY, BATCH, EVENTS, EXAMPLES, EXPORT, LIBCOSIM, PARAMETERS, PYTHON, SCENARIOS, STEP,
+    STUDIES, TEST_ONE, TRAJECTORIES,
 ) = (
     DOCS / f"{name}.md"
     for name in (
@@ -41,6 +42,7 @@ pytestmark = pytest.mark.usefixtures("workplace")
         "explanation/batch",
         "how-to/events",
         "reference/examples",
+        "how-to/export-results",
         "how-to/hosts/libcosim",
         "how-to/change-parameters",
         "how-to/python",
@@ -209,7 +211,7 @@ def test_study_has_as_many_runs_as_the_page_says():
 @needs_studies
 def test_an_index_of_ones_own_is_a_column(workplace):
     """The last time at which the depth is not near, from the rows of each run."""
-    Path("settling_time.py").write_text(blocks(STUDIES, "python")[1].text)
+    Path("settling_time.py").write_text(blocks(STUDIES, "python")[2].text)
     Path("settling.toml").write_text(blocks(STUDIES, "toml")[1].text)
     assert main(["check", "settling.toml"]) == 0
     assert main(["check", "settling_time.py"]) == 0
@@ -226,6 +228,64 @@ def test_study_in_python_has_the_columns_that_the_page_says(capsys):
     first, second, *_ = executed(STUDIES, capsys)
     assert first == "6 0 ['run', 'plant.eta0.y', 'controller.saturation', 'l2_effort.u']"
     assert second == "[0. 0. 1. 1. 2. 2.] [None None None None None None]"
+
+
+@needs_studies
+def test_a_function_is_an_index_of_a_result_and_of_a_study(capsys):
+    """The last time at which the depth is not near, from the rows of each run."""
+    _, line = executed(STUDIES, capsys, 1)
+    times, shares = (np.fromstring(text, sep=" ") for text in re.findall(r"\[(.*?)\]", line))
+    for z, time, share in zip((-5.0, 0.0, 5.0), times, shares, strict=True):
+        run = simulate("fig4", {"plant.eta0.z": z}, stop_time=20.0, kind="native")
+        away = np.abs(run["plant.eta.z"] - run["planner.y_d.z"]) > 0.5
+        assert time == pytest.approx(run.time[away][-1], abs=1e-6)
+        assert share == pytest.approx(sum(away) / len(run), abs=1e-6)
+
+
+def exported(number: int) -> Result:
+    """The result that a part of the page about exports has written."""
+    names: dict[str, Any] = {}
+    for code in (blocks(EXPORT, "python")[i].text for i in (0, number)):
+        exec(compile(code, EXPORT.name, "exec"), names)
+    result: Result = names["result"]
+    return result
+
+
+def test_matlab_gets_columns_and_units():
+    result = exported(1)
+    from scipy.io import loadmat  # noqa: PLC0415
+
+    content = loadmat("fig4.mat", squeeze_me=True)
+    assert np.array_equal(content["time"], result.time)
+    assert np.array_equal(content["controller_theta_hat_1"], result["controller.theta_hat[1]"])
+    assert str(content["units"]["plant_tau_q"]) == "N.m"
+    assert len([name for name in content if name[0] != "_"]) == len(result.columns) + 2
+
+
+def test_hdf5_and_netcdf_get_columns_and_units():
+    h5py = pytest.importorskip("h5py", reason="needs the extra `docs`")
+    result = exported(2)
+    with h5py.File("fig4.h5") as file:
+        assert file.keys() == {"time", *result}
+        assert np.array_equal(file["plant.eta.z"], result["plant.eta.z"])
+        assert file["plant.eta.z"].attrs["units"] == "m"
+    pytest.importorskip("netCDF4", reason="needs the extra `docs`")
+    xarray = pytest.importorskip("xarray", reason="needs the extra `docs`")
+    exported(3)
+    with xarray.open_dataset("fig4.nc") as dataset:
+        assert [*dataset.data_vars] == [*result]
+        assert np.array_equal(dataset["plant.tau.q"], result["plant.tau.q"])
+        assert np.array_equal(dataset["time"], result.time)
+        assert (dataset["plant.tau.q"].units, dataset.scenario) == ("N.m", "fig4")
+
+
+@needs("parquet, and pandas", "pandas", "pyarrow")
+def test_pandas_keeps_units_in_parquet(capsys):
+    exported(4)
+    assert capsys.readouterr().out == "N.m\n"
+    from pandas import read_parquet  # noqa: PLC0415
+
+    assert read_parquet("fig4.parquet").attrs["units"]["plant.eta.psi"] == "rad"
 
 
 QUIET = {"plant.noise.std": 0.0}

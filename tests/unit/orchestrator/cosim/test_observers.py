@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -103,6 +104,41 @@ def test_without_a_lag_the_row_of_a_time_shows_the_values_of_its_step():
 def test_unknown_column_has_a_suggestion():
     with pytest.raises(KeyError, match=r"did you mean a\.start"):
         table([0.0])["a.strat"]
+
+
+def test_groups_and_patterns_are_columns_side_by_side_in_their_order():
+    """`expected` is from the places of the columns in the rows."""
+    rows = np.arange(10.0).reshape(2, 5)
+    kept = Table.of(HEADER, rows)
+    for name, places in (("a", [1, 2]), ("b.k", [3, 4]), ("*.k[*]", [3, 4]), ("b.k[2]", [4])):
+        assert name in kept
+        assert np.array_equal(kept[name].reshape(2, -1), rows[:, places])
+    assert np.array_equal(kept.group("b.k", "time", "a.x"), rows[:, [3, 4, 0, 1]])
+    assert kept["a.x"].ndim == 1 and kept["b.k[2*"].shape == (2, 1)
+    assert dict(kept).keys() == {*COLUMNS} and [*kept] == [*COLUMNS]
+    for name in ("c", "a.", "a.xy", "", 0):
+        assert name not in kept
+        with pytest.raises(KeyError):
+            kept[name]
+    with pytest.raises(KeyError, match=r"no column or group 'b\.kk'; did you mean b\.k"):
+        kept["b.kk"]
+    assert kept.missing(["b.k", "a.x", "time"]) == ["b.k"]
+
+
+def test_a_group_of_texts_and_numbers_is_refused():
+    header = Header(
+        ("a.x", "a.word", "a.words[1]"),
+        Experiment(1.0, 1.0),
+        types={"a.word": "String", "a.words[1]": "String"},
+    )
+    number = header.strings.number("high")
+    kept = Table.of(header, np.array([[0.0, 1.5, number, number]]))
+    assert kept["a.words"].tolist() == [["high"]]
+    assert kept.group("a.word", "a.words").tolist() == [["high", "high"]]
+    with pytest.raises(InputError, match=r"a\.x, a\.word.*texts and numbers"):
+        kept["a"]
+    again = pickle.loads(pickle.dumps(kept))
+    assert again["a.word"].tolist() == ["high"]
 
 
 def test_missing_names_what_is_not_there():

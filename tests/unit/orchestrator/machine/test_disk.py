@@ -7,6 +7,8 @@ import json
 import os
 import re
 import signal
+import subprocess
+import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -80,6 +82,22 @@ def test_temporary_folders_of_killed_processes_are_removed_by_the_next(tmp_path:
     [second] = tmp_path.iterdir()
     assert second != first
     assert Path(own.name).is_dir()
+
+
+def test_temporary_folders_end_with_their_processes_without_a_warning():
+    """Forked processes end in another way."""
+    script = (
+        "from multiprocessing import get_context\n"
+        "from orchestrator.machine.disk import process_folder\n"
+        "def work(): print(process_folder(), flush=True)\n"
+        "child = get_context('fork').Process(target=work)\n"
+        "child.start(); child.join(); work()\n"
+    )
+    command = [sys.executable, "-X", "dev", "-W", "error", "-c", script]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    folders = {*done.stdout.split()}
+    assert len(folders) == 2 and not any(Path(folder).exists() for folder in folders)
 
 
 def test_threads_share_one_temporary_folder(tmp_path: Path, monkeypatch):

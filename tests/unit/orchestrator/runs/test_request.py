@@ -23,7 +23,7 @@ from orchestrator.studies.sweep import Means
 OF_SIMULATE = {
     "system", "parameters", "progress", "variant", "checkpoint", "checkpoint_every", "resume",
 }  # fmt: skip
-OF_SWEEP = {"study", "out", "progress"}
+OF_SWEEP = {"study", "indices", "out", "progress"}
 
 #: Options of the command line, and the values that they give.
 GIVEN: Mapping[type[Any], Mapping[str, Any]] = {

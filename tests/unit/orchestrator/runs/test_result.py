@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import pickle
+import shutil
 from concurrent.futures import ProcessPoolExecutor
 from copy import deepcopy
 from datetime import datetime
@@ -17,7 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import orchestrator
-from orchestrator import Result, read, simulate
+from orchestrator import Result, load, read, simulate
 from orchestrator.commands.main import main
 from orchestrator.cosim import Ending, Experiment, Header, Occurrence, PortName
 from orchestrator.figures.drawing import save
@@ -107,16 +108,40 @@ def test_a_copied_result_is_the_same(tmp_path, loop):
 
 
 @pytest.mark.parametrize("method", ["spawn", *slow("fork", "forkserver")])
-def test_a_result_is_returned_by_a_pool_of_processes(tmp_path, method):
+@pytest.mark.parametrize("name", ["auv.ssp", "fig4"])
+def test_a_result_is_returned_by_a_pool_of_processes(native, tmp_path, name, method):
     """Also after the process that made it has ended, and removed its unpacked FMUs."""
     if method not in multiprocessing.get_all_start_methods():
         pytest.skip(f"there is no {method} here")
+    system = str(native / name) if name.endswith(".ssp") else name
     context = multiprocessing.get_context(method)
     loop = "python" if find_compiler() is None else "compiled"
     with ProcessPoolExecutor(1, mp_context=context) as pool:
-        found = pool.submit(simulate, "fig4", stop_time=0.1, loop=loop).result()
-    assert is_the_same(found, simulate("fig4", stop_time=0.1))
+        found = pool.submit(simulate, system, stop_time=0.1, loop=loop).result()
+    assert is_the_same(found, simulate(system, stop_time=0.1))
     assert np.array_equal(read(found.save(tmp_path)).rows, found.rows)
+    assert np.array_equal(simulate(found.system, stop_time=0.1).rows, found.rows)
+
+
+def test_a_system_brings_its_fmus_to_other_processes(native, tmp_path):
+    path = tmp_path / "AuvPlant.fmu"
+    shutil.copy(native / path.name, path)
+    sent = pickle.dumps(load(str(path)))
+    path.write_bytes(b"another")
+    arrived = pickle.loads(sent)
+    twice = pickle.loads(pickle.dumps(arrived))
+    for system in (arrived, twice):
+        rows = simulate(system, stop_time=0.1, step=0.02).rows
+        assert np.array_equal(
+            rows, simulate(str(native / path.name), stop_time=0.1, step=0.02).rows
+        )
+    assert [part.fmu.name for part in arrived.components.values()] == [path.name]
+
+
+def test_a_failed_result_is_pickled_without_the_rows_that_it_lacks(failed):
+    room = 8 * 5001 * (1 + len(failed.columns))
+    again = pickle.loads(sent := pickle.dumps(failed))
+    assert np.array_equal(again.rows, failed.rows) and len(sent) < room / 2
 
 
 def test_failure_and_events_are_read_again(failed, tmp_path):
@@ -219,8 +244,12 @@ def test_notebook_shows_the_indices_with_all_texts_escaped(title):
 
 
 def test_unknown_names_are_key_errors_with_a_suggestion(result):
-    with pytest.raises(KeyError, match=r"plant\.eta\.x"):
-        result["plant.eta"]
+    with pytest.raises(
+        KeyError, match=r"no column or group 'plant\.etta'; did you mean plant\.eta"
+    ):
+        result["plant.etta"]
+    with pytest.raises(KeyError, match="0"):
+        result[0]
     with pytest.raises(KeyError, match=r"controller\.k_d"):
         result.parameters["controller.kd"]
     with pytest.raises(ValueError, match="no column matches"):
@@ -260,6 +289,38 @@ def test_dataframe_has_the_time_as_its_index(result):
     assert np.array_equal(frame["plant.y.x"], result["plant.y.x"])
     frame.iloc[:] = 0.0
     assert result["plant.eta.x"][0] == 2.0
+
+
+def test_dataframe_has_units_scenario_and_experiment_as_in_json(result, tmp_path):
+    pytest.importorskip("pandas", reason="needs the extra `docs`")
+    order = ("disturbance", "plant", "planner", "controller")
+    for made in (result, simulate("fig4", stop_time=0.1, order=order)):
+        attributes = made.to_dataframe().attrs
+        assert json.loads(json.dumps(attributes, allow_nan=False)) == attributes
+        assert (attributes["scenario"], attributes["failure"]) == ("fig4", None)
+        assert attributes["experiment"]["stop_time"] == 0.1
+        assert attributes["units"]["plant.tau.q"] == "N.m"
+
+
+def test_units_are_as_the_fmus_state_them(result, tmp_path):
+    """A stored result has them, too."""
+    stated = {
+        f"{name}.{variable.name}": variable.unit or ""
+        for name, component in result.system.components.items()
+        for variable in component.variables.values()
+    }
+    assert result.units == {"time": "s"} | {name: stated[name] for name in result.columns}
+    assert result.units["plant.eta.psi"] == "rad" and result.units["plant.fault"] == ""
+    assert read(result.save(tmp_path)).units == result.units
+
+
+def test_names_in_an_editor_are_those_that_a_user_needs(result):
+    assert {"metrics", "plot", "units", "keys"} <= {*dir(result)}
+    assert not {"begin", "take", "end", "hold", "of"} & {*dir(result)}
+    completions = result._ipython_key_completions_()
+    assert {"time", "plant.eta", "plant.eta.x", "controller.theta_hat"} <= {*completions}
+    assert all(name in result for name in completions)
+    assert result["plant.eta"].shape == (6, 6)
 
 
 # The record
@@ -373,3 +434,10 @@ def test_duration_does_not_depend_on_the_clock(monkeypatch):
     times = Stopwatch().times()
     assert times["seconds"] == 2.25
     assert datetime.fromisoformat(str(times["started"])).utcoffset() is not None
+
+
+def test_a_run_lasts_as_long_however_late_it_is_saved(monkeypatch):
+    monkeypatch.setattr("orchestrator.runs.result.monotonic", iter([5.0, 7.25]).__next__)
+    clock = Stopwatch()
+    clock.stop()
+    assert [pickle.loads(pickle.dumps(clock)).times()["seconds"] for _ in range(2)] == [2.25, 2.25]

@@ -80,11 +80,12 @@ def test_interrupt_ends_processes_that_are_busy():
 
 @pytest.mark.slow
 def test_script_without_a_guard_is_told_what_it_needs(tmp_path):
+    """Also if the engine is longer than what a pipe holds."""
     script = tmp_path / "script.py"
     script.write_text(
         "from orchestrator.studies.sweep import making_runs\n"
         "from support.toy_engine import Toy\n"
-        "with making_runs(Toy(), [], workers=1): pass\n"
+        "with making_runs(Toy('x' * 1_000_000), [], workers=1): pass\n"
     )
     process = subprocess.run(
         [sys.executable, script],
