@@ -47,8 +47,8 @@ def campaign():
             del auv[target]
             auv.run(until=STOP)
             result = auv.result()
-            errors = [result[f"plant.y.{axis}"] - result[f"planner.y_d.{axis}"] for axis in "xyz"]
-            distance = np.linalg.norm(errors, axis=0)
+            errors = result["plant.y"] - result["planner.y_d"]
+            distance = np.linalg.norm(errors, axis=1)
             since, last = result.time >= BEGIN, result.time >= STOP - 5.0
             yield name, distance[since].max(), distance[last].max()
 

@@ -58,7 +58,7 @@ if __name__ == "__main__":
     results = {"paper": paper, "PD": simulate(pd, QUIET, stop_time=STOP), "MPC": mpc(paper)}
     print("       within 0.5 m   final error   effort in u, q, r")
     for name, result in results.items():
-        errors = [result[f"plant.y.{axis}"] - result[f"planner.y_d.{axis}"] for axis in "xyz"]
-        after = result.time[np.linalg.norm(errors, axis=0) > 0.5][-1]
+        errors = result["plant.y"] - result["planner.y_d"]
+        after = result.time[np.linalg.norm(errors, axis=1) > 0.5][-1]
         error, effort = max(result.metrics()["final_error"]), result.metrics()["l2_effort"]
         print(f"{name:5} after {after:4.1f} s {error:13.3f} m  ", *(f"{k:5.0f}" for k in effort))
