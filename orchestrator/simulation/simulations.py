@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -13,6 +12,7 @@ import numpy as np
 
 from orchestrator.cosim import Order, PortName, System, Value, Variable
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.workers import cores
 from orchestrator.program.session import Place, ProgramSession, stepped_program
 from orchestrator.runs.preparation import prepare_options
 from orchestrator.runs.request import SystemOptions
@@ -93,7 +93,7 @@ class Simulations:
         self.step_size, self.stop_time = experiment.step, prepared.stop_time
         self._start_time = experiment.start_time
         self._memory = np.zeros((n, program.size), dtype=np.uint8)
-        self._threads = min(threads or os.cpu_count() or 1, max(n // _WORTH_A_THREAD, 1))
+        self._threads = min(threads or cores(), max(n // _WORTH_A_THREAD, 1))
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
         bounds = np.linspace(0, n, self._threads + 1).astype(int).tolist()
         self._parts = [*pairwise(bounds)]
