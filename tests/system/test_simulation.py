@@ -8,6 +8,7 @@ import signal
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from threading import Timer
 from typing import Any
@@ -22,6 +23,7 @@ from hypothesis import strategies as st
 from auv_fmu import Result, Simulation, SimulationFailed, Simulations, load, simulate
 from orchestrator.cosim import System
 from orchestrator.machine.compilers import machines_compiler
+from support.mixed import Shape, build
 from support.tiers import slow
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -34,6 +36,7 @@ WAYS = [
     ({"kind": "native", "loop": "compiled"}, "compiled"),
     ({"kind": "native", "loop": "python"}, "python"),
     *slow(
+        ({"kind": "native", "fmi": "3", "loop": "compiled"}, "compiled"),
         ({"kind": "python", "loop": "compiled"}, "compiled"),
         ({"kind": "native", "isolate": True}, "python"),
     ),
@@ -141,18 +144,17 @@ def test_any_sequence_ends_as_a_straight_run(
     assert last.tolist() == result.rows[-1, place(result, "plant.eta")].tolist()
 
 
-_systems: dict[str, System] = {}
-
-
 def fig4(way: dict[str, Any]) -> System:
-    kind = way["kind"]
-    if kind not in _systems:
-        _systems[kind] = load("fig4", kind)
-    return _systems[kind]
+    return loaded(way["kind"], way.get("fmi", "2"))
+
+
+@cache
+def loaded(kind: Any, fmi: Any) -> System:
+    return load("fig4", kind, fmi=fmi)
 
 
 def without_kind(way: dict[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in way.items() if name != "kind"}
+    return {name: value for name, value in way.items() if name not in ("kind", "fmi")}
 
 
 def place(result: Result, group: str) -> list[int]:
@@ -313,6 +315,22 @@ def test_a_loop_that_cannot_be_had_is_refused():
             Simulation("fig4", **options)
     with pytest.raises(TypeError, match=r"^Simulation\(\) got an unexpected keyword argument 'h'"):
         Simulation("fig4", h=0.1)
+
+
+def test_an_fmu_without_states_steps_and_is_named_where_it_needs_one(tmp_path: Path):
+    fmu = build(tmp_path, Shape((1, 0, 0, 0), (1, 0, 0, 0)))
+    with Simulation(fmu, step=0.1) as sim:
+        [name] = [name for name in sim.result().columns if "input" in name]
+        sim[name] = 2.0
+        sim.step()
+        assert (sim.time, sim[name], sim.stop_time) == (0.1, 2.0, None)
+        for needs_one in (sim.save, sim.copy):
+            with pytest.raises(ValueError, match="its FMU does not provide its state"):
+                needs_one()
+        with pytest.raises(ValueError, match=r"has no stop time; use run\(until=...\)"):
+            sim.run()
+        sim.run(until=0.3)
+        assert sim.result().time.tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3], abs=1e-15)
 
 
 def test_states_can_be_pickled_and_rows_left_out():
