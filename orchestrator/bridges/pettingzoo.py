@@ -33,7 +33,7 @@ _SEEDS = 2**31
 #: Price of a second too near to another vehicle, as of a squared error [m2].
 _NEAR = 10.0
 
-_NORTH_AND_DOWN = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+_DOWN_AND_NORTH = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 
 Dict: TypeAlias = dict[str, Any]
 
@@ -44,7 +44,7 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):
     Agents are called as the vehicles: `auv1`, `auv2` and so on.
 
     Observation, all vectors in the body frame: tracking error [m], desired velocity [m/s] and
-    acceleration [m/s2], north and down; then, of each other vehicle, the position that its last
+    acceleration [m/s2], down and north; then, of each other vehicle, the position that its last
     message brought, from the own one [m], and last, if there are others, the age of these messages
     [s]. Positions are those of control points, as measured.
 
@@ -199,8 +199,8 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):
         y_d, dy_d, ddy_d = (self._values("planner", name) for name in ("y_d", "dy_d", "ddy_d"))
         vectors = np.concatenate(
             (
-                np.stack((y_d - y, dy_d, ddy_d), axis=1),
-                np.tile(_NORTH_AND_DOWN, (len(y), 1, 1)),
+                np.stack((y - y_d, dy_d, ddy_d), axis=1),
+                np.tile(_DOWN_AND_NORTH, (len(y), 1, 1)),
                 self._sent[self._others] - y[:, np.newaxis],
             ),
             axis=1,
