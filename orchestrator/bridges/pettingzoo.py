@@ -151,7 +151,7 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):
         self._simulation.reset(drawn)
         self.agents = [*self.possible_agents]
         self._left = self._n_actions
-        self._sent: np.ndarray | None = None
+        self._sent_at = -np.inf
         self._seen = self._observed()
         return {**self._seen}, {agent: {} for agent in self.agents}
 
@@ -192,7 +192,7 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):
         y = self._values("vehicle", "y")
         eta = self._values("vehicle", "eta")
         time = self._simulation.time
-        if self._sent is None or time >= self._sent_at + self._message_period - 1e-9:
+        if time >= self._sent_at + self._message_period - 1e-9:
             self._sent, self._sent_at = y, time
         apart = np.linalg.norm(eta[self._others, :3] - eta[:, np.newaxis, :3], axis=2)
         self._is_near = (apart < self._distance).any(axis=1)

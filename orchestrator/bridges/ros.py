@@ -229,7 +229,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ("--real-time", "limit the speed to so many times real time"),
         ("--timeout", "longest wait for commands [s]; default: for ever"),
     ):
-        parser.add_argument(flag, type=float, metavar="S", help=text)
+        parser.add_argument(flag, type=float, metavar="X", help=text)
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the result")
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser.parse_args(remove_ros_args(given))
