@@ -162,7 +162,7 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):
     ]:
         """Take an action of each agent."""
         agents, simulation = self.agents, self._simulation
-        chosen = np.clip([actions[agent] for agent in agents], -1.0, 1.0)
+        chosen = np.clip(np.array([actions[agent] for agent in agents], float), -1.0, 1.0)
         failure = None
         try:
             for loop, values in zip(self._loops, self._middle + self._half * chosen, strict=True):

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from math import inf
 from pathlib import Path
 from time import monotonic
@@ -218,59 +219,64 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     """
     parser = argparse.ArgumentParser("python -m orchestrator.bridges.ros", description=__doc__)
-    parser.add_argument("system", metavar="SCENARIO|FILE")
+    parser.add_argument("system", metavar="SCENARIO|FILE", help="system, as of `auv-fmu run`")
     parser.add_argument(
         "--set", action="append", default=[], metavar="COMPONENT.PARAMETER=VALUE",
         help="set a parameter; may be repeated",
     )  # fmt: skip
-    for flag, text in (
-        ("--stop-time", "end of the run [s]; default: the scenario's"),
-        ("--step", "communication step [s]; default: the scenario's"),
-        ("--real-time", "limit the speed to so many times real time"),
-        ("--timeout", "longest wait for commands [s]; default: for ever"),
+    for flag, unit, text in (
+        ("--stop-time", "S", "end of the run [s]; default: the scenario's"),
+        ("--step", "S", "communication step [s]; default: the scenario's"),
+        ("--real-time", "FACTOR", "limit the speed to FACTOR times real time"),
+        (
+            "--timeout",
+            "S",
+            "longest wait for commands [s], then the last ones go on; default: none",
+        ),
     ):
-        parser.add_argument(flag, type=float, metavar="X", help=text)
+        parser.add_argument(flag, type=float, metavar=unit, help=text)
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for the result")
     given = sys.argv[1:] if arguments is None else list(arguments)
     options = parser.parse_args(remove_ros_args(given))
     try:
         rclpy.init(args=given)
-        return _run(options)
+        _run(options)
     except InputError as error:
         parser.exit(_BAD_INPUT, f"{parser.prog}: error: {error}\n")
+    except SimulationFailed as error:
+        print(error, file=sys.stderr)
+        return _FAILED
+    except (KeyboardInterrupt, ExternalShutdownException):
+        return _INTERRUPTED
     finally:
         rclpy.try_shutdown()
+    return _OK
 
 
-def _run(options: argparse.Namespace) -> int:
+def _run(options: argparse.Namespace) -> None:
+    """Run a node, and write its result."""
     parameters = {}
     for text in options.set:
         name, equals, value = text.partition("=")
         if not equals:
             raise InputError(f"--set {text}: write COMPONENT.PARAMETER=VALUE")
         parameters[name.strip()] = value.strip()
-    lockstep = Lockstep(
-        options.system,
-        parameters,
-        stop_time=options.stop_time,
-        step=options.step,
-        real_time=options.real_time,
-        timeout=options.timeout,
-        keep=options.out is not None,
-    )
-    status = _OK
-    try:
-        lockstep.run()
-    except SimulationFailed as error:
-        print(error, file=sys.stderr)
-        status = _FAILED
-    except (KeyboardInterrupt, ExternalShutdownException):
-        status = _INTERRUPTED
-    finally:
-        if options.out is not None:
-            lockstep.simulation.result().save(options.out)
-        lockstep.close()
-    return status
+    with closing(
+        Lockstep(
+            options.system,
+            parameters,
+            stop_time=options.stop_time,
+            step=options.step,
+            real_time=options.real_time,
+            timeout=options.timeout,
+            keep=options.out is not None,
+        )
+    ) as lockstep:
+        try:
+            lockstep.run()
+        finally:
+            if options.out is not None:
+                lockstep.simulation.result().save(options.out)
 
 
 if __name__ == "__main__":
