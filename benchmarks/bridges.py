@@ -4,7 +4,7 @@
 - `ros`: steps of fig4 with a controller in another process, which answers with zeros. A round trip
   is a step without the step of the simulation itself.
 
-Times are those of the wall clock, medians of the repetitions.
+Times are wall-clock times, medians of the repetitions.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ earth        x north, y east, z down                x east, y north, z up
 body         x forward, y to starboard, z down      x forward, y to port, z up
 ===========  =====================================  ==================================
 
-Both body frames have their origin in the centre of mass. All numbers but those of the attitude
+Both body frames have their origin in the centre of mass. All numbers but the attitude's
 change places and signs only, so they pass without rounding.
 """
 

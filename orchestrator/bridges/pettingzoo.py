@@ -101,11 +101,10 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):
                 raise InputError(f"{title}: has no {name}, which an agent needs")
         self._simulation = Simulation(scenario, parameters, stop_time=duration, keep=False)
         self._every, self._interval = every, every * self._simulation.step_size
-        self._n_actions = floor(self._simulation.stop_time / self._interval + 1e-9)
+        length = self._simulation.stop_time or 0.0
+        self._n_actions = floor(length / self._interval + 1e-9)
         if self._n_actions < 1:
-            raise InputError(
-                f"duration = {self._simulation.stop_time:g} s: at least {self._interval:g} s"
-            )
+            raise InputError(f"duration = {length:g} s: at least {self._interval:g} s")
         self._effort, self._distance = effort, distance
         self._message_period = message_period
         self._moves = np.array([offset] * 3 + [0.0] * 3)
@@ -140,7 +139,7 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):
     def reset(
         self, seed: int | None = None, options: Dict | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Dict]]:
-        """Begin an episode; without a seed, the random numbers go on."""
+        """Begin an episode; without a seed, the random numbers continue."""
         if seed is not None:
             self._random = np.random.default_rng(seed)
         drawn: Dict = {}

@@ -42,7 +42,7 @@ except ImportError as error:
 #: Most messages that wait, on each topic.
 _DEPTH = 10
 
-#: Time after which the first odometry is published again, since nobody may have heard it [s].
+#: Time after which the first odometry is published again, for controllers that came late [s].
 _PATIENCE = 1.0
 
 #: Exit statuses, as of `auv-fmu`.
@@ -76,7 +76,7 @@ class Lockstep:
         Args:
             system, parameters, stop_time, step, keep: as for :class:`Simulation`.
             real_time: simulated seconds per second at most; None: as fast as commands come.
-            timeout: longest wait for commands [s], after which the last ones go on; None: for ever.
+            timeout: longest wait for commands [s], after which the last ones stay; None: for ever.
 
         Raises:
             ValueError: a name or a value is not usable, or there is no vehicle.
@@ -109,7 +109,8 @@ class Lockstep:
 
         """
         simulation = self.simulation
-        step, end = simulation.step_size, simulation.stop_time
+        step = simulation.step_size
+        end = inf if simulation.stop_time is None else simulation.stop_time
         began = monotonic() - simulation.time / self._real_time
         while (left := (end - simulation.time) / step) > 1e-9:
             next_time = simulation.time + min(left, 1.0) * step
@@ -231,7 +232,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         (
             "--timeout",
             "S",
-            "longest wait for commands [s], then the last ones go on; default: none",
+            "longest wait for commands [s], then the last ones stay; default: none",
         ),
     ):
         parser.add_argument(flag, type=float, metavar=unit, help=text)

@@ -43,7 +43,7 @@ def test_attitude_has_the_axes_found_by_hand(euler, forward, port, up):
 
 
 @given(ANGLES, ANGLES, ANGLES)
-def test_attitude_is_that_of_the_vehicle_between_both_pairs_of_frames(phi, theta, psi):
+def test_attitude_is_the_vehicles_between_both_pairs_of_frames(phi, theta, psi):
     paper = Rotation.from_euler("ZYX", [psi, theta, phi]).as_matrix()
     np.testing.assert_allclose(axes(phi, theta, psi).T, EARTH @ paper @ BODY, atol=1e-14)
 

@@ -98,6 +98,6 @@ def test_a_component_that_fails_ends_the_episode():
         ({"duration": 0.05}, "at least 0.1 s"),
     ],
 )
-def test_what_cannot_be_an_environment_is_refused(arguments, culprit):
+def test_other_systems_and_times_are_refused(arguments, culprit):
     with pytest.raises(ValueError, match=culprit):
         Formation(**arguments)

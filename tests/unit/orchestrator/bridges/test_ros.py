@@ -1,4 +1,4 @@
-"""The node and a controller, as two processes, and the numbers of a simulation by itself."""
+"""The node and a controller, as two processes, and the numbers of steps by hand."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ pytestmark = [
     pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler"),
 ]
 
-#: Axes of ROS in those of the vehicle.
+#: Axes of ROS, in the paper's.
 EARTH, BODY = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]]), np.diag([1, -1, -1])
 ANGLES = ("psi", "theta", "phi")
 
@@ -36,7 +36,7 @@ CONTROLLER = str(Path(__file__).parents[3] / "support" / "ros_controller.py")
         ("formation-v", 1.0, {f"auv{k}/": f"auv{k}." for k in (1, 2, 3)}),
     ],
 )
-def test_a_controller_in_another_process_gives_the_numbers_of_the_simulation_alone(
+def test_a_controller_in_another_process_gives_the_numbers_of_steps_by_hand(
     scenario, stop_time, names, tmp_path
 ):
     with beside(CONTROLLER, str(stop_time), *names) as controller:
@@ -77,7 +77,7 @@ def test_a_controller_in_another_process_gives_the_numbers_of_the_simulation_alo
         np.testing.assert_allclose(seen, axes[names[prefix]][row], rtol=0, atol=1e-12)
 
 
-def test_without_an_answer_in_time_the_scenarios_own_controller_goes_on(tmp_path):
+def test_without_an_answer_in_time_the_scenarios_own_controller_acts(tmp_path):
     apart = ("--ros-args", "-r", "__ns:=/boat")
     run_node("fig4", "--stop-time", "1", "--timeout", "0", "--out", str(tmp_path), *apart)
     expected = simulate("fig4", stop_time=1.0)
