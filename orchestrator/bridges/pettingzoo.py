@@ -38,7 +38,7 @@ _DOWN_AND_NORTH = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 Dict: TypeAlias = dict[str, Any]
 
 
-class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):
+class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):  # type: ignore[misc]
     """Vehicles without velocity sensors that are to keep their places in a formation.
 
     Agents are called as the vehicles: `auv1`, `auv2` and so on.
