@@ -14,6 +14,7 @@ room                contents
 :mod:`.runs`        scenarios, wiring, bundle, one run and its files
 :mod:`.program`     a system as one compiled program
 :mod:`.simulation`  a system that is stepped, or many side by side
+:mod:`.bridges`     simulations in the form that other libraries step
 :mod:`.live`        the page in which a system runs
 :mod:`.exchange`    other tools: hosts, verification of their tables
 :mod:`.studies`     many runs

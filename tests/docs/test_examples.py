@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from ast import literal_eval
 from importlib.util import find_spec
 from inspect import signature
 from math import isfinite
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from orchestrator import Result, simulate, sweep
+from orchestrator import Result, read, simulate, sweep
 from orchestrator.commands.main import main
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.preparation import load_scenario
@@ -28,13 +29,14 @@ from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import tracking_error, true_control_point
 from support.machine import contents
 from support.markdown import DOCS, blocks
+from support.ros import beside, run_node
 from support.tiers import slow
 
 pytestmark = pytest.mark.usefixtures("workplace")
 
 (
-    ACCURACY, BATCH, EVENTS, EXAMPLES, EXPORT, LIBCOSIM, PARAMETERS, PYTHON, SCENARIOS, STEP,
-    STUDIES, TEST_ONE, TRAJECTORIES,
+    ACCURACY, BATCH, EVENTS, EXAMPLES, EXPORT, LIBCOSIM, PARAMETERS, PYTHON, ROS, SCENARIOS, STEP,
+    STUDIES, TEST_ONE, TRAJECTORIES, VEHICLES,
 ) = (
     DOCS / f"{name}.md"
     for name in (
@@ -46,11 +48,13 @@ pytestmark = pytest.mark.usefixtures("workplace")
         "how-to/hosts/libcosim",
         "how-to/change-parameters",
         "how-to/python",
+        "how-to/ros",
         "reference/scenario-files",
         "how-to/step",
         "how-to/studies",
         "how-to/test-one-component",
         "how-to/trajectories",
+        "how-to/vehicles",
     )
 )  # fmt: skip
 
@@ -345,6 +349,29 @@ def test_a_users_trajectory_follows_its_table(capsys: pytest.CaptureFixture[str]
     with pytest.raises(ValueError, match="planner") as refused:
         simulate("eight.toml")
     assert str(refused.value) == " ".join(blocks(TRAJECTORIES, "text")[0].text.split())
+
+
+@needs("pettingzoo", "pettingzoo")
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_agents_on_the_page_about_vehicles_get_rewards(capsys):
+    [line] = executed(VEHICLES, capsys)
+    rewards = literal_eval(line)
+    assert [*rewards] == ["auv1", "auv2", "auv3"] and max(rewards.values()) < 0.0
+
+
+@pytest.mark.slow
+@needs("ros", "rclpy")
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_pilot_in_ros_goes_to_the_east():
+    Path("pilot.py").write_text(blocks(ROS, "python")[0].text)
+    with beside("pilot.py"):
+        run_node("fig4", "--stop-time", "30", "--out", "result")
+    result = read("result")
+    late = result.time > 20.0
+    assert np.degrees(result["plant.eta.psi"][late]) == pytest.approx(90.0, abs=5.0)
+    assert np.degrees(result["plant.eta.theta"][late]) == pytest.approx(0.0, abs=5.0)
+    # 20 N against the damping of 30 kg/s, and a friction of 0.5 N.
+    assert np.diff(result["plant.eta.y"][late]) / 0.02 == pytest.approx(0.65, abs=0.05)
 
 
 def test_master_runs_an_ssp_as_its_page_says(native, workplace, capsys):

@@ -23,8 +23,8 @@ ROOT = Path(__file__).parents[2]
 FLOORS = {
     "auv_fmu": ("language", "paper", "proof", "remus", "water", "guidance", "loop"),
     "orchestrator": (
-        "machine", "cosim", "vehicle", "figures", "runs", "program", "simulation", "live",
-        "exchange", "studies", "paper", "commands",
+        "machine", "cosim", "vehicle", "figures", "runs", "program", "simulation", "bridges",
+        "live", "exchange", "studies", "paper", "commands",
     ),
     "fmus": (
         "ports", "language", "components", "kinds", "discovery", "documentation", "script",
@@ -37,9 +37,10 @@ ALLOWED = {
     "auv_fmu": set(),
     "fmus": {"auv_fmu", "markdown_it", "orchestrator", "pythonfmu"},
     "orchestrator": {
-        "auv_fmu", "dask", "distributed", "filelock", "fmpy", "fmus", "libcosimpy", "lxml",
-        "markdown_it", "matplotlib", "mpl_toolkits", "numpy", "onnx", "pandas", "PIL",
-        "platformdirs", "pyarrow", "pydantic", "pydantic_core", "scipy", "tqdm",
+        "auv_fmu", "builtin_interfaces", "dask", "distributed", "filelock", "fmpy", "fmus",
+        "geometry_msgs", "gymnasium", "libcosimpy", "lxml", "markdown_it", "matplotlib",
+        "mpl_toolkits", "nav_msgs", "numpy", "onnx", "pandas", "pettingzoo", "PIL", "platformdirs",
+        "pyarrow", "pydantic", "pydantic_core", "rclpy", "rosgraph_msgs", "scipy", "tqdm",
     },
 }  # fmt: skip
 
