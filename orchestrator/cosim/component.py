@@ -14,6 +14,7 @@ import fmpy
 from fmpy.model_description import ModelDescription, ValidationError
 
 from orchestrator.cosim.variables import (
+    TYPES,
     Terminal,
     Value,
     Variable,
@@ -287,13 +288,16 @@ class Component:
         """
         return self.arrays.get(name) or [self.variable(name)]
 
-    def having(self, causality: str, fmi_type: str | None = None) -> list[Variable]:
-        """Return the variables of one causality and type, in the order of the description."""
-        return [
-            variable
-            for variable in self.variables.values()
-            if variable.causality == causality and fmi_type in (None, variable.type)
-        ]
+    def having(self, causality: str) -> list[Variable]:
+        """Return the variables of one causality, in the order of the description."""
+        return [v for v in self.variables.values() if v.causality == causality]
+
+    def by_type(self, causality: str) -> dict[str, list[Variable]]:
+        """Return the variables of one causality by type, in the order of a row."""
+        by_type: dict[str, list[Variable]] = {}
+        for variable in self.having(causality):
+            by_type.setdefault(variable.type, []).append(variable)
+        return {fmi_type: by_type[fmi_type] for fmi_type in TYPES if fmi_type in by_type}
 
     def start(self, name: str) -> Value | None:
         """Return the start value of a variable, in its type, if the description has one.

@@ -83,6 +83,29 @@ class SessionState(NamedTuple):
     dues: Sequence[int]
 
 
+class _Calls:
+    """Calls of FMUs from this process.
+
+    Attributes:
+        surroundings: to put back after a call; None: there is no call.
+        interrupts: signals that have arrived in the last call.
+
+    """
+
+    def __init__(self) -> None:
+        self.surroundings: Surroundings | None = None
+        self.interrupts = Interrupts()
+
+    def ours(self) -> AbstractContextManager[None]:
+        """Return the context in which observers are called."""
+        return nullcontext() if self.surroundings is None else self.surroundings.ours()
+
+    def put_back(self) -> None:
+        """Put back what FMUs have changed in this process."""
+        if self.surroundings is not None:
+            self.surroundings.put_back()
+
+
 class Session:
     """A system whose FMUs are loaded, and stepped by calls of :meth:`advance`.
 
@@ -120,8 +143,8 @@ class Session:
         self._stack = ExitStack()
         self._steps: Iterator[None] | None = None
         self._present: np.ndarray | None = None
-        self._surroundings: Surroundings | None = None
-        self._interrupts = Interrupts()
+        # Apart from the session, which would else refer to itself, and keep its rows for longer.
+        self._calls = _Calls()
         self._is_calm = plan.isolation is None and all(
             component.is_ours and not component.runs_python
             for component in plan.system.components.values()
@@ -142,34 +165,33 @@ class Session:
             briefly: if set, FMUs of this program in C are called without it: they change nothing.
 
         """
-        if self._surroundings is not None or (briefly and self._is_calm):
+        if self._calls.surroundings is not None or (briefly and self._is_calm):
             return nullcontext()
         return self._calling()
 
     @contextmanager
     def _calling(self) -> Iterator[None]:
+        calls = self._calls
         # Overflowing values are reported as the value of a port, not by numpy.
         with (
             np.errstate(all="ignore"),
             default_mode(),
-            held_interrupts() as self._interrupts,
-            Surroundings() as self._surroundings,
+            held_interrupts() as calls.interrupts,
+            Surroundings() as calls.surroundings,
         ):
+            hand_over = calls.interrupts.hand_over
             self._watch_interrupts()
             try:
                 yield
             finally:
-                self._surroundings.put_back()
-                self._surroundings = None
+                calls.put_back()
+                calls.surroundings = None
+                calls.interrupts.hand_over = hand_over
 
     def _watch_interrupts(self) -> None:
         if hasattr(self, "run"):
-            self.run.interrupts = self._interrupts
-            self._interrupts.hand_over = self.run.blocks.hand_over
-
-    def _ours(self) -> AbstractContextManager[None]:
-        """Return the context in which observers are called."""
-        return nullcontext() if self._surroundings is None else self._surroundings.ours()
+            self.run.interrupts = self._calls.interrupts
+            self._calls.interrupts.hand_over = self.run.blocks.hand_over
 
     def __enter__(self) -> Session:
         """Open the session, unless it is open."""
@@ -182,18 +204,18 @@ class Session:
             InputError: an FMU or a parameter is not usable.
 
         """
-        plan = self.plan
+        plan, calls = self.plan, self._calls
         for line in plan.remarks:
             self._log.remark(line)
         with self.calling(), ExitStack() as stack:
             with _explained():
                 self._instances = stack.enter_context(
                     place_instances(
-                        plan.system.components, self._log, plan.isolation, lambda: self._interrupts
+                        plan.system.components, self._log, plan.isolation, lambda: calls.interrupts
                     )
                 )
                 # Called first: a forked copy of this process must not end their processes.
-                stack.callback(self._put_back)
+                stack.callback(calls.put_back)
                 self._stepping = _possible_stepping(self._stepping, self._instances, self._log)
             stack.push(self._tell_failure)
             self._begin()
@@ -204,10 +226,6 @@ class Session:
         """Free the FMUs."""
         with self.calling():
             self._stack.__exit__(*failure)
-
-    def _put_back(self) -> None:
-        if self._surroundings is not None:
-            self._surroundings.put_back()
 
     def _begin(self) -> None:
         """Exchange initial values, and tell the observers."""
@@ -229,17 +247,17 @@ class Session:
                 row.strings,
             )
         (stages, passing), gatherings = coupling.stages()
-        with self._ours():
+        with self._calls.ours():
             for observer in self._observers:
                 observer.begin(self.header)
                 self._begun.append(observer)
-        blocks = Blocks(len(row.shown), self._observers, self._ours, row.inputs_of("Float32"))
+        blocks = Blocks(len(row.shown), self._observers, self._calls.ours, row.inputs_of("Float32"))
         if passing is None:
             blocks.append(experiment.start_time, row.shown)
         overrides = Overrides(row, gatherings, system.connections)
         self.run = Run(
             system, experiment, instances, row, stages, passing,
-            overrides, blocks, log, self._interrupts, self._hooks,
+            overrides, blocks, log, self._calls.interrupts, self._hooks,
         )  # fmt: skip
         self._order = [name for names in coupling.plan.arrangement.stages for name in names]
         self._steps = self._present = None
@@ -279,7 +297,7 @@ class Session:
             failure = f"stopped at t = {run.time:.12g} s: {error}"
         except KeyboardInterrupt:
             failure = f"interrupted at t = {run.time:.12g} s{run.interrupts}"
-            if self._surroundings is None:
+            if self._calls.surroundings is None:
                 # Perhaps within a step: no other may follow.
                 self.failure = failure
                 raise
@@ -292,7 +310,7 @@ class Session:
             raise
         except Exception as error:
             failure = f"stopped at t = {run.time:.12g} s: {unforeseen(error)}"
-        self._put_back()
+        self._calls.put_back()
         # Checked even if another component has refused the value in the same step.
         if wrong := run.row.wrong(self._order, run.passing is not None):
             failure = f"stopped at t = {run.experiment.time(blocks.count):.12g} s: {wrong}"
@@ -322,10 +340,9 @@ class Session:
 
     def take_interrupts(self) -> Sequence[int]:
         """Return the signals that have stopped the last steps; more steps may then follow."""
-        numbers = self._interrupts.numbers
+        numbers = self._calls.interrupts.numbers
         if numbers:
-            self._interrupts = Interrupts()
-            self._watch_interrupts()
+            self._calls.interrupts = self.run.interrupts = Interrupts()
             self.failure = None
         return numbers
 
@@ -465,7 +482,7 @@ class Session:
             self.failure,
             self.remark,
             self._log.messages,
-            tuple(self._interrupts.numbers),
+            tuple(self._calls.interrupts.numbers),
             tuple(self.run.happened),
         )
 
@@ -483,7 +500,7 @@ class Session:
 
     def _tell(self, ending: Ending) -> None:
         """End the observers; all of them are ended, even if one fails."""
-        self._put_back()
+        self._calls.put_back()
         while self._begun:
             self._begun.pop(0).end(ending)
 

@@ -26,7 +26,7 @@ from orchestrator.cosim.connection import (
     likely_port,
 )
 from orchestrator.cosim.experiment import MOST_STEPS, Experiment, Order
-from orchestrator.cosim.variables import TYPES, Value, Variable
+from orchestrator.cosim.variables import Value, Variable
 from orchestrator.machine.disk import plain_file_names, process_folder
 from orchestrator.machine.errors import InputError, did_you_mean, listed
 from orchestrator.machine.texts import is_finite
@@ -482,9 +482,8 @@ class System:
         """
         for name, component in self.components.items():
             for causality in ("input", "output"):
-                for fmi_type in TYPES:
-                    if ports := component.having(causality, fmi_type):
-                        yield name, causality, fmi_type, ports
+                for fmi_type, ports in component.by_type(causality).items():
+                    yield name, causality, fmi_type, ports
 
     def units(self, ports: Iterable[PortName]) -> dict[str, str]:
         """Return the units of the ports that have one."""

@@ -680,9 +680,9 @@ class _Ports:
         self._typed: list[tuple[str, slice]] = []
         self._standing: list[tuple[int, ModelVariable, Standing]] = []
         n = 0
-        for name, own in TYPES.items():
-            ports = component.having(causality, name)
-            if ports and own.family != "Real":
+        for name, ports in component.by_type(causality).items():
+            own = TYPES[name]
+            if own.family != "Real":
                 self._typed.append((name, slice(n, n + len(ports))))
             if own.stands:
                 standing = Standing(name, strings)
