@@ -67,12 +67,12 @@ class Header:
         cls, system: System, experiment: Experiment, columns: Sequence[PortName], loop: str
     ) -> Header:
         """Make the header of a run without FMUs, with the parameters of its system."""
-        parameters = {
-            name: variable.shown(system.value(name))
-            for component in system.components.values()
-            for variable in component.having("parameter")
-            for name in (PortName(component.name, variable.name),)
-        }
+        parameters = {}
+        for component in system.components.values():
+            own, starts = system.parameters_of(component.name), component.starts
+            for variable in component.having("parameter"):
+                value = own.get(variable.name, starts.get(variable.name))
+                parameters[PortName(component.name, variable.name)] = variable.shown(value)
         names = tuple(map(str, columns))
         return cls(names, experiment, parameters, loop, units=system.units(columns))
 

@@ -96,11 +96,18 @@ class SteppedProgram:
             for i, (name, (at, whole)) in enumerate(zip(text.parameters, settables_at, strict=True))
         }
         self.members = dict(zip(_MEMBERS, members_at.tolist(), strict=True))
-        self._text = text
+        bare = replace(plan.system, parameters={})
+        #: Values of parameters and inputs that a system does not set.
+        self._starts = np.array([float(text.start(name, bare)) for name in self.settables])
 
     def parameters(self, plan: Plan) -> np.ndarray:
         """Return the values of all parameters and unconnected inputs at the start of a plan."""
-        return np.array([float(self._text.start(name, plan.system)) for name in self.settables])
+        values = self._starts.copy()
+        for name, value in plan.system.parameters.items():
+            if name in self.settables:
+                number, _ = self.settables[name]
+                values[number] = self.number(name, value)
+        return values
 
     def number(self, name: PortName, value: Value) -> float:
         """Return the number of a value of a port; an item of an Enumeration has one."""
