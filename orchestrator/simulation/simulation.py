@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, TypeAlias, cast, get_args
+from typing import Any, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 
@@ -55,36 +55,44 @@ class SimulationOptions(SystemOptions):
     keep: bool = option(True, "keep a row for each step, for `result`")
 
 
+class _Link(NamedTuple):
+    """Rows, and those before them: simulations that go back share rows."""
+
+    before: _Link | None
+    rows: np.ndarray
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return all rows as one link: a chain may be too long for pickle."""
+        return _Link, (None, all_rows(self))
+
+
+def all_rows(link: _Link | None) -> np.ndarray:
+    """Return the rows up to a link."""
+    parts = []
+    while link is not None:
+        parts.append(link.rows)
+        link = link.before
+    return np.concatenate(parts[::-1]) if parts else np.empty((0, 0))
+
+
 class _Rows:
-    """An observer that keeps rows, as a chain: simulations that go back share what they have.
+    """An observer that keeps rows.
 
     Attributes:
-        kept: the latest link: the link before it, and rows; None: no rows.
+        kept: the latest link; None: there are no rows.
 
     """
 
-    def __init__(self) -> None:
-        self.kept: _Link | None = None
+    kept: _Link | None = None
 
     def begin(self, header: Header) -> None:
         self.kept = None
 
     def take(self, rows: np.ndarray) -> None:
-        self.kept = self.kept, rows.copy()
+        self.kept = _Link(self.kept, rows.copy())
 
     def end(self, ending: object) -> None:
         pass
-
-    def all(self, width: int) -> np.ndarray:
-        """Return all rows."""
-        parts, link = [], self.kept
-        while link is not None:
-            link, rows = link
-            parts.append(rows)
-        return np.concatenate([*reversed(parts), np.empty((0, width))])
-
-
-_Link: TypeAlias = "tuple[_Link | None, np.ndarray]"
 
 
 class _Settable(NamedTuple):
@@ -172,7 +180,7 @@ class State(NamedTuple):
     columns: tuple[str, ...]
     loop: str
     session: Any
-    rows: Any
+    rows: _Link | None
     held: Mapping[PortName, Value]
 
 
@@ -572,11 +580,11 @@ class Simulation:
             raise InputError("no rows are kept, as keep=False asks for")
         session = self._session
         session.hand_over()
-        rows = self._rows.all(1 + len(session.header.columns))
+        rows = all_rows(self._rows.kept)
         if not session.is_shown:
-            row = np.concatenate(([self.time], session.values()))
+            row = np.concatenate(([self.time], session.values()))[np.newaxis]
             if np.isfinite(row).all():
-                rows = np.concatenate((rows, [row]))
+                rows = np.concatenate((rows, row)) if len(rows) else row
         experiment: Experiment = session.header.experiment
         if self.time > experiment.start_time:
             experiment = replace(experiment, stop_time=self.time)
