@@ -61,7 +61,7 @@ def single(loop: str, steps: int, repetitions: int) -> None:
                 act()
 
         times = [1e6 * timed(repeat) / n for _ in range(repetitions)]
-        print(f"{loop:9} {name:14} {median(times):8.2f} us")
+        print(f"{loop:9} {name:14} {median(times):8.1f} us")
         bare.reset()
         sim.reset()
 
@@ -99,9 +99,9 @@ def many(n: int, repetitions: int) -> None:
     ours, theirs, stepped = (median(times) for times in zip(*rows, strict=True))
     ratio = median(own / other for own, other, _ in rows)
     print(
-        f"{n:6} at once: run {1e6 * ours / n / steps:6.3f} us a step, batch engine "
-        f"{1e6 * theirs / n / steps:6.3f}, ratio {ratio:.2f}; set, step and read "
-        f"{1e6 * stepped / n / (steps // 10):6.3f} us"
+        f"{n:6} at once: run {1e6 * ours / n / steps:6.2f} us a step, batch engine "
+        f"{1e6 * theirs / n / steps:6.2f}, ratio {ratio:.2f}; set, step and read "
+        f"{1e6 * stepped / n / (steps // 10):6.2f} us"
     )
 
 
