@@ -25,6 +25,9 @@ from orchestrator.machine.errors import InputError
 ACTUATORS, AXES = tuple(map(str, quantities.TAU)), tuple(map(str, quantities.POSITION))
 EULER, DIRECTIONS = tuple(map(str, quantities.EULER)), tuple(map(str, quantities.NU))
 
+#: The observation of a learned controller, from the component Observation.
+OBSERVATION = "observation.o"
+
 #: Columns and parameters that a figure or computation needs: arguments of :meth:`.Table.missing`.
 Needs = tuple[Sequence[str], Sequence[str]]
 
@@ -53,6 +56,8 @@ class Loop:
     #: eta: centre of mass [m] and Euler angles [rad], earth frame.
     position, attitude = _Group("vehicle", "eta", AXES), _Group("vehicle", "eta", EULER)
     posture = _Group("vehicle", "eta", (*AXES, *EULER))
+    #: The parameters of position [m] and heading [rad] at the start.
+    start = _Group("vehicle", "eta0", (*AXES, "psi"))
     #: nu [m/s, rad/s], body frame.
     nu = _Group("vehicle", "nu", DIRECTIONS)
     #: Velocity of the control point [m/s].
@@ -87,6 +92,11 @@ class Loop:
     def ell(self) -> str:
         """The parameter ell [m]: distance of the control point ahead of the centre of mass."""
         return f"{self.vehicle}.ell"
+
+    @property
+    def seed(self) -> str:
+        """The parameter noise.seed."""
+        return f"{self.vehicle}.noise.seed"
 
     def port(self, name: str) -> str:
         """Return the name in this loop of a signal or parameter of the standard loop."""
