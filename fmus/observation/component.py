@@ -1,4 +1,4 @@
-"""Observation of a learned controller: tracking error, reference and vertical, in the body frame."""
+"""Observation for a learned controller: tracking error and reference in the body frame."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ from orchestrator.runs.preparation import DEFAULT_STEP, load
 from orchestrator.runs.request import method_takes_keywords, option
 from orchestrator.simulation.simulation import Simulation, SimulationFailed
 from orchestrator.simulation.simulations import Simulations
-from orchestrator.vehicle.signals import OBSERVATION, Loop, loops_of
+from orchestrator.vehicle.signals import Loop, loops_of
 
 #: Seeds of the noise are drawn below this number.
 _SEEDS = 2**31
@@ -63,7 +63,7 @@ class _Task:
 
     Attributes:
         system: the scenario's, with an observation in place of the controller.
-        command: name of the group of signals that actions set.
+        command, seen: names of the groups that actions set, and of the observation.
         every: steps that an action lasts.
         n_actions: number of actions in an episode.
         observations, actions: spaces.
@@ -88,11 +88,11 @@ class _Task:
             raise InputError(f"duration = {options.duration:g} s: at least {self._interval:g} s")
         lower, upper = (self._values(names) for names in (loop.lower_limits, loop.upper_limits))
         self._middle, self._half = (lower + upper) / 2, (upper - lower) / 2
-        self.command = loop.commanded[0].rpartition(".")[0]
+        self.command, self.seen = loop.commanded[0].rpartition(".")[0], f"{loop.controller}.o"
         self._start = dict(zip(loop.start, self._values(loop.start), strict=True))
         self._moves = np.array([options.offset] * 3 + [options.turn])
         self._seed, self._effort = loop.seed, options.effort
-        n = len(self.system.members(OBSERVATION, ("output",)))
+        n = len(self.system.members(self.seen, ("output",)))
         self.observations = Box(-np.inf, np.inf, (n,), np.float64)
         self.actions = Box(-1.0, 1.0, (len(loop.commanded),), np.float32)
 
@@ -130,29 +130,27 @@ def _observed(system: System) -> tuple[System, Loop]:
     loop, *others = loops_of(system)
     if others or loop.controller not in system.components:
         raise InputError(f"{system.name}: must have one vehicle and its controller")
-    name = OBSERVATION.partition(".")[0]
-    observation = read_component(name, current_fmus() / "Observation.fmu")
-    inputs = {variable.name for variable in observation.having("input")}
-    connections = [
-        replace(connection, target=PortName(name, connection.target.port))
-        if connection.target.component == loop.controller
-        else connection
-        for connection in system.connections
-        if connection.source.component != loop.controller
-        and (connection.target.component != loop.controller or connection.target.port in inputs)
-    ]
+    observation = read_component(loop.controller, current_fmus() / "Observation.fmu")
     observed = replace(
         system,
-        components={
-            **{n: c for n, c in system.components.items() if n != loop.controller},
-            name: observation,
+        components={**system.components, loop.controller: observation},
+        connections=tuple(
+            connection
+            for connection in system.connections
+            if connection.source.component != loop.controller
+            and (
+                connection.target.component != loop.controller
+                or connection.target.port in observation.variables
+            )
+        ),
+        parameters={
+            port: value
+            for port, value in system.parameters.items()
+            if port.component != loop.controller
         },
-        connections=tuple(connections),
-        parameters={p: v for p, v in system.parameters.items() if p.component != loop.controller},
-        steps={n: step for n, step in system.steps.items() if n != loop.controller},
         left_open={*system.left_open, *map(PortName.read, loop.commanded)},
     )
-    if missing := observed.open_inputs(name):
+    if missing := observed.open_inputs(loop.controller):
         raise InputError(f"{system.name}: nothing feeds {loop.controller}.{missing[0]}")
     return observed, loop
 
@@ -198,7 +196,7 @@ class Tracking(gymnasium.Env[np.ndarray, np.ndarray]):  # type: ignore[misc]
         parameters = {name: values.item() for name, values in starts.items()}
         self._simulation.reset(parameters)
         self._left = self._task.n_actions
-        self._seen: np.ndarray = self._simulation[OBSERVATION]
+        self._seen: np.ndarray = self._simulation[self._task.seen]
         return self._seen, parameters
 
     def step(self, action: np.ndarray) -> tuple[np.ndarray, float, bool, bool, dict[str, Any]]:
@@ -210,7 +208,7 @@ class Tracking(gymnasium.Env[np.ndarray, np.ndarray]):  # type: ignore[misc]
             simulation[task.command] = task.commands(action)
             for _ in range(task.every):
                 simulation.step()
-            self._seen = simulation[OBSERVATION]
+            self._seen = simulation[task.seen]
         except SimulationFailed:
             terminated = True
         self._left -= 1
@@ -278,7 +276,7 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
         starts = self._task.starts([self._generators[i] for i in numbers])
         self._simulations.reset(numbers, starts)
         self._left[which] = self._task.n_actions
-        self._seen[which] = self._simulations[OBSERVATION][which]
+        self._seen[which] = self._simulations[self._task.seen][which]
         infos = {}
         for name, values in starts.items():
             infos[name] = np.zeros(self.num_envs, values.dtype)
@@ -297,7 +295,7 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
             simulations.step(task.every)
         self._left -= 1
         terminated, truncated = simulations.failed, self._left <= 0
-        self._seen = np.where(terminated[:, np.newaxis], self._seen, simulations[OBSERVATION])
+        self._seen = np.where(terminated[:, np.newaxis], self._seen, simulations[task.seen])
         rewards = task.rewards(self._seen, actions)
         infos = {}
         if ended.any():

@@ -25,9 +25,6 @@ from orchestrator.machine.errors import InputError
 ACTUATORS, AXES = tuple(map(str, quantities.TAU)), tuple(map(str, quantities.POSITION))
 EULER, DIRECTIONS = tuple(map(str, quantities.EULER)), tuple(map(str, quantities.NU))
 
-#: The observation of a learned controller, from the component Observation.
-OBSERVATION = "observation.o"
-
 #: Columns and parameters that a figure or computation needs: arguments of :meth:`.Table.missing`.
 Needs = tuple[Sequence[str], Sequence[str]]
 
