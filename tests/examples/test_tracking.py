@@ -1,0 +1,50 @@
+"""The learned policy: its native FMU in the loop of Fig. 4 makes the rollout of the environment."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from auv_fmu import simulate
+from orchestrator.commands.main import main
+from orchestrator.machine.compilers import machines_compiler
+from support.examples import EXAMPLES
+
+onnx, gymnasium = pytest.importorskip("onnx"), pytest.importorskip("gymnasium")
+
+pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+
+#: Length of the rollout [s].
+END = 30.0
+
+
+def policy(path: Path):
+    """The network as a function of an observation, in double precision; actions within [-1, 1]."""
+    arrays = map(onnx.numpy_helper.to_array, onnx.load(path).graph.initializer)
+    W1, b1, W2, b2, W3, b3 = (array.astype(float) for array in arrays)
+    return lambda o: np.clip(W3 @ np.tanh(W2 @ np.tanh(W1 @ o + b1) + b2) + b3, -1.0, 1.0)
+
+
+def test_fmu_of_the_policy_repeats_the_rollout_of_the_environment(tmp_path, monkeypatch):
+    """In double precision, but for sums in another order; and comes near to the reference."""
+    monkeypatch.chdir(tmp_path)
+    for name in ("policy.onnx", "tracking.toml"):
+        shutil.copyfile(EXAMPLES / "tracking" / name, name)
+    assert main(["new", "component", "policy", "--from", "policy.onnx"]) == 0
+    assert main(["build", "policy/policy.py", "--kind", "native", "--out", "."]) == 0
+    env = gymnasium.make(
+        "orchestrator.bridges.gymnasium:auv_fmu/Tracking-v0", duration=END, every=1, offset=0.0,
+        turn=0.0,
+    )  # fmt: skip
+    seen, parameters = env.reset(seed=1)
+    act, rollout, ended = policy(Path("policy.onnx")), [seen], False
+    while not ended:
+        seen, _, _, ended, _ = env.step(act(seen))
+        rollout.append(seen)
+    result = simulate("tracking.toml", parameters, stop_time=END)
+    names = [f"controller.o[{i}]" for i in range(1, 13)]
+    assert result.group(*names) == pytest.approx(np.array(rollout), rel=0, abs=1e-9)
+    assert max(result.metrics()["final_error"]) < 0.1
