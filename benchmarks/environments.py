@@ -1,11 +1,11 @@
 """Speed of environments for learning, ours and others': `python benchmarks/environments.py`.
 
 Each is measured in a process of its own, with random actions that stay the same. Printed are the
-steps a second, of all environments side by side together, and the simulated seconds a second. A
-step of ours, which lasts an action, is five communication steps.
+steps a second, of all environments side by side together, and the simulated seconds a second. For
+auv-fmu, a step is an action, and five communication steps.
 
 For the others: `pip install gymnasium envpool crazyflow pyflyt gym-sailing`, then `pip install
-'numpy>=2'`, with which PyFlyt runs as well. ship-env, sailboat-gym and holoocean can be installed
+'numpy>=2'`, with which PyFlyt runs, too. ship-env, sailboat-gym and holoocean can be installed
 by their names, but cannot be run: they need the abandoned package gym, Docker, and a game engine
 that is not in the package.
 """

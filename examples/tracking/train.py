@@ -3,7 +3,7 @@
     pip install stable-baselines3 onnx
     python examples/tracking/train.py
 
-`docs/how-to/learn.md` says what becomes of it.
+`docs/how-to/learn.md` makes an FMU of it.
 """
 
 from __future__ import annotations

@@ -59,7 +59,7 @@ class TrackingVectorOptions(TrackingOptions):
 
 
 class _Task:
-    """What a single environment and many of them have in common.
+    """The task of a single environment, or of many.
 
     Attributes:
         system: the scenario's, with an observation in place of the controller.

@@ -74,8 +74,8 @@ def test_vector_has_the_numbers_of_single_environments(parameters, ending):
     assert ends >= 18
 
 
-def test_observation_and_reward_are_those_of_a_vehicle_steered_by_hand():
-    """Of the whole system of Fig. 4, in which commands override the controller's."""
+def test_vehicle_steered_by_hand_gives_the_same_observations_and_rewards():
+    """In the whole system of Fig. 4, where commands override the controller's."""
     env = gymnasium.make(ID, duration=0.96, every=3, effort=0.25)
     (seen, parameters), random = env.reset(seed=3), np.random.default_rng(2)
     with Simulation("fig4", parameters) as sim:
