@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
-from orchestrator.cosim import Order, PortName, System, Value, Variable
+from orchestrator.cosim import Linear, Mapped, Order, PortName, System, Value, Variable
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.workers import cores
 from orchestrator.program.session import Place, ProgramSession, stepped_program
@@ -21,6 +21,9 @@ from orchestrator.simulation.simulation import ports_of
 
 #: Least number of simulations for which a further thread is worth its start.
 _WORTH_A_THREAD = 128
+
+#: A port that is set, and the inputs that take its value, each with a transformation.
+_Settable: TypeAlias = tuple[PortName, Variable, list[tuple[PortName, (Linear | Mapped) | None]]]
 
 #: More steps than anybody makes.
 _MANY = 500_000_000
@@ -108,6 +111,7 @@ class Simulations:
         )
         self._values = np.tile(program.parameters(prepared.plan), (n, 1))
         self._views: dict[str, np.ndarray] = {}
+        self._settables: dict[str, list[_Settable]] = {}
         self._is_stale = False
         self.reset(parameters=each)
 
@@ -213,20 +217,30 @@ class Simulations:
             ValueError: there is no such input or parameter, or it does not take the values.
 
         """
-        ports = ports_of(self._system, name, ("input", "output", "parameter"))
-        columns = _columns(name, values, self.n, len(ports))
-        for port, column in zip(ports, columns, strict=True):
-            variable = self._system.variable(port)
+        settables = self._settable(name)
+        columns = _columns(name, values, self.n, len(settables))
+        for (port, variable, targets), column in zip(settables, columns, strict=True):
             numbers = _numbers(variable, column, port)
             if variable.causality == "parameter":
                 self._tune(port, variable, numbers)
-                continue
-            for target, change in routes(self._system, port):
+            for target, change in targets:
                 arriving = numbers
                 if change is not None:
                     arriving = np.array([float(change(value)) for value in numbers.tolist()])
                 self._override(target, arriving)
         self._is_stale = True
+
+    def _settable(self, name: str) -> list[_Settable]:
+        """Return the ports of a name that can be set."""
+        if name not in self._settables:
+            system = self._system
+            ports = ports_of(system, name, ("input", "output", "parameter"))
+            variables = [system.variable(port) for port in ports]
+            self._settables[name] = [
+                (port, v, [] if v.causality == "parameter" else routes(system, port))
+                for port, v in zip(ports, variables, strict=True)
+            ]
+        return self._settables[name]
 
     def _override(self, target: PortName, numbers: np.ndarray) -> None:
         i = self._program.inputs[target]

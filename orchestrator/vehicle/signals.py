@@ -53,6 +53,8 @@ class Loop:
     #: eta: centre of mass [m] and Euler angles [rad], earth frame.
     position, attitude = _Group("vehicle", "eta", AXES), _Group("vehicle", "eta", EULER)
     posture = _Group("vehicle", "eta", (*AXES, *EULER))
+    #: The parameters of position [m] and heading [rad] at the start.
+    start = _Group("vehicle", "eta0", (*AXES, "psi"))
     #: nu [m/s, rad/s], body frame.
     nu = _Group("vehicle", "nu", DIRECTIONS)
     #: Velocity of the control point [m/s].
@@ -87,6 +89,11 @@ class Loop:
     def ell(self) -> str:
         """The parameter ell [m]: distance of the control point ahead of the centre of mass."""
         return f"{self.vehicle}.ell"
+
+    @property
+    def seed(self) -> str:
+        """The parameter noise.seed."""
+        return f"{self.vehicle}.noise.seed"
 
     def port(self, name: str) -> str:
         """Return the name in this loop of a signal or parameter of the standard loop."""

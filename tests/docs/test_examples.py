@@ -35,8 +35,8 @@ from support.tiers import slow
 pytestmark = pytest.mark.usefixtures("workplace")
 
 (
-    ACCURACY, BATCH, EVENTS, EXAMPLES, EXPORT, LIBCOSIM, PARAMETERS, PYTHON, ROS, SCENARIOS, STEP,
-    STUDIES, TEST_ONE, TRAJECTORIES, VEHICLES,
+    ACCURACY, BATCH, EVENTS, EXAMPLES, EXPORT, LEARN, LIBCOSIM, PARAMETERS, PYTHON, ROS, SCENARIOS,
+    STEP, STUDIES, TEST_ONE, TRAJECTORIES, VEHICLES,
 ) = (
     DOCS / f"{name}.md"
     for name in (
@@ -45,6 +45,7 @@ pytestmark = pytest.mark.usefixtures("workplace")
         "how-to/events",
         "reference/examples",
         "how-to/export-results",
+        "how-to/learn",
         "how-to/hosts/libcosim",
         "how-to/change-parameters",
         "how-to/python",
@@ -170,6 +171,12 @@ def prints_what_it_says(page: Path, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
 def test_simulations_stepped_on_the_page_print_what_it_says(capsys):
     prints_what_it_says(STEP, capsys)
+
+
+@needs("gymnasium", "gymnasium")
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_environments_on_the_page_print_what_it_says(capsys):
+    prints_what_it_says(LEARN, capsys)
 
 
 @needs("parquet, and pandas", "pandas", "pyarrow")
