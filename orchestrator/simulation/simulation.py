@@ -95,7 +95,7 @@ class _Rows:
         pass
 
 
-class _Settable(NamedTuple):
+class Settable(NamedTuple):
     """An input, an output or a parameter that is set.
 
     Attributes:
@@ -113,7 +113,7 @@ class _Settable(NamedTuple):
     targets: Sequence[tuple[PortName, Linear | Mapped | None]]
 
     @classmethod
-    def of(cls, system: System, port: PortName) -> _Settable:
+    def of(cls, system: System, port: PortName) -> Settable:
         """Describe a port of a system."""
         variable = system.variable(port)
         least, most = inf, -inf
@@ -166,6 +166,24 @@ def ports_of(system: System, name: str, causalities: Sequence[str] = _VALUED) ->
         if variable.causality in _VALUED
     ]
     raise InputError(f"no port or parameter {name!r}{did_you_mean(name, known)}")
+
+
+def settables_of(system: System, name: str) -> list[Settable]:
+    """Return the ports of a name that can be set between two steps.
+
+    Raises:
+        InputError: there are none.
+
+    """
+    ports = ports_of(system, name, ("input", "output", "parameter"))
+    for port in ports:
+        variable = system.variable(port)
+        if variable.causality == "parameter" and variable.variability != "tunable":
+            raise InputError(
+                f"{port} is a {variable.variability} parameter: reset({{{str(port)!r}: ...}}) "
+                "begins again with another value"
+            )
+    return [Settable.of(system, port) for port in ports]
 
 
 def _close(session: Session | ProgramSession) -> None:
@@ -242,7 +260,7 @@ class Simulation:
         self._has_hooks = bool(prepared.events or prepared.input_tables)
         self._closing = weakref.finalize(self, _close, self._session)
         self._names: dict[str, Any] = {}
-        self._settables: dict[str, list[_Settable]] = {}
+        self._settables: dict[str, list[Settable]] = {}
         self._begin()
 
     def _opened(self) -> Session | ProgramSession:
@@ -473,7 +491,7 @@ class Simulation:
             session.release(target)
             del self._held[target]
 
-    def _settable(self, name: str) -> list[_Settable]:
+    def _settable(self, name: str) -> list[Settable]:
         """Return the ports of a name that can be set.
 
         Raises:
@@ -482,16 +500,7 @@ class Simulation:
         """
         if name in self._settables:
             return self._settables[name]
-        system = self._now.system
-        ports = ports_of(system, name, ("input", "output", "parameter"))
-        for port in ports:
-            variable = system.variable(port)
-            if variable.causality == "parameter" and variable.variability != "tunable":
-                raise InputError(
-                    f"{port} is a {variable.variability} parameter: reset({{{str(port)!r}: ...}}) "
-                    "begins again with another value"
-                )
-        settables = [_Settable.of(system, port) for port in ports]
+        settables = settables_of(self._now.system, name)
         self._settables[name] = settables
         return settables
 

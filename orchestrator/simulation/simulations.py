@@ -6,24 +6,21 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim import Linear, Mapped, Order, PortName, System, Value, Variable
+from orchestrator.cosim import Order, PortName, System, Value, Variable
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.workers import cores
 from orchestrator.program.session import Place, ProgramSession, stepped_program
 from orchestrator.runs.preparation import prepare_options
 from orchestrator.runs.request import SystemOptions
 from orchestrator.runs.scenario import routes
-from orchestrator.simulation.simulation import ports_of
+from orchestrator.simulation.simulation import Settable, ports_of, settables_of
 
 #: Least number of simulations for which a further thread is worth its start.
 _WORTH_A_THREAD = 128
-
-#: A port that is set, and the inputs that take its value, each with a transformation.
-_Settable: TypeAlias = tuple[PortName, Variable, list[tuple[PortName, (Linear | Mapped) | None]]]
 
 #: More steps than anybody makes.
 _MANY = 500_000_000
@@ -111,7 +108,7 @@ class Simulations:
         )
         self._values = np.tile(program.parameters(prepared.plan), (n, 1))
         self._views: dict[str, np.ndarray] = {}
-        self._settables: dict[str, list[_Settable]] = {}
+        self._settables: dict[str, list[Settable]] = {}
         self._is_stale = False
         self.reset(parameters=each)
 
@@ -217,30 +214,20 @@ class Simulations:
             ValueError: there is no such input or parameter, or it does not take the values.
 
         """
-        settables = self._settable(name)
+        if name not in self._settables:
+            self._settables[name] = settables_of(self._system, name)
+        settables = self._settables[name]
         columns = _columns(name, values, self.n, len(settables))
-        for (port, variable, targets), column in zip(settables, columns, strict=True):
-            numbers = _numbers(variable, column, port)
-            if variable.causality == "parameter":
-                self._tune(port, variable, numbers)
-            for target, change in targets:
+        for settable, column in zip(settables, columns, strict=True):
+            numbers = _numbers(settable.variable, column, settable.port)
+            if not settable.targets:
+                self._tune(settable.port, numbers)
+            for target, change in settable.targets:
                 arriving = numbers
                 if change is not None:
                     arriving = np.array([float(change(value)) for value in numbers.tolist()])
                 self._override(target, arriving)
         self._is_stale = True
-
-    def _settable(self, name: str) -> list[_Settable]:
-        """Return the ports of a name that can be set."""
-        if name not in self._settables:
-            system = self._system
-            ports = ports_of(system, name, ("input", "output", "parameter"))
-            variables = [system.variable(port) for port in ports]
-            self._settables[name] = [
-                (port, v, [] if v.causality == "parameter" else routes(system, port))
-                for port, v in zip(ports, variables, strict=True)
-            ]
-        return self._settables[name]
 
     def _override(self, target: PortName, numbers: np.ndarray) -> None:
         i = self._program.inputs[target]
@@ -251,12 +238,7 @@ class Simulations:
             # Nothing feeds it.
             self._view([self._program.columns[target]])[:, 0] = numbers
 
-    def _tune(self, port: PortName, variable: Variable, numbers: np.ndarray) -> None:
-        if variable.variability != "tunable":
-            raise InputError(
-                f"{port} is a {variable.variability} parameter: reset(parameters=...) begins again "
-                "with other values"
-            )
+    def _tune(self, port: PortName, numbers: np.ndarray) -> None:
         number, _ = self._program.settables[port]
         before = self[str(port)].astype(float)
         numbers = np.ascontiguousarray(numbers)
