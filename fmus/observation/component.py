@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from auv_fmu import Variable, Vector, __author__, __license__, __version__
+from auv_fmu import Variable, Vector, __author__, __citation__, __license__, __version__
 from auv_fmu.language.quantities import ACCELERATION, EULER, POSITION, VELOCITY
 from auv_fmu.language.vectors import Vector3, sub
 from auv_fmu.paper.attitude import rotate_back, rotation_from_euler

@@ -1,10 +1,12 @@
 """Environments of Gymnasium: importing this module registers `auv_fmu/Tracking-v0`.
 
-import gymnasium
-import orchestrator.bridges.gymnasium
+    import gymnasium
+    import orchestrator.bridges.gymnasium
 
-env = gymnasium.make("auv_fmu/Tracking-v0")
-envs = gymnasium.make_vec("auv_fmu/Tracking-v0", num_envs=1000)
+    env = gymnasium.make("auv_fmu/Tracking-v0")
+    envs = gymnasium.make_vec("auv_fmu/Tracking-v0", num_envs=1000)
+
+Rewards and starts are made here, observations by the component Observation.
 """
 
 from __future__ import annotations
@@ -262,7 +264,7 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
         """Begin an episode in each environment."""
         if seed is not None:
             seeds = range(seed, seed + self.num_envs) if isinstance(seed, int) else seed
-            for i, each in enumerate(seeds):
+            for i, each in zip(range(self.num_envs), seeds, strict=True):
                 if each is not None:
                     self._generators[i], _ = np_random(each)
         self._left = np.empty(self.num_envs, int)
