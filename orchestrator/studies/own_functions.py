@@ -13,6 +13,7 @@ from importlib import import_module
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
+from sysconfig import get_path
 from types import CodeType, FunctionType, MethodType, ModuleType
 from typing import Any, Self
 
@@ -78,9 +79,28 @@ def _restored(name: str, content: bytes, columns: tuple[str, ...]) -> OwnFunctio
 
 
 def _pickled(function: Callable[[Result], object]) -> bytes:
-    by_value = find_spec(_BY_VALUE) is not None
-    content: bytes = (import_module(_BY_VALUE) if by_value else pickle).dumps(function)
+    if find_spec(_BY_VALUE) is None:
+        return pickle.dumps(function)
+    by_value = import_module(_BY_VALUE)
+    named = function.func if isinstance(function, partial) else function
+    module = sys.modules.get(str(getattr(named, "__module__", "")))
+    # Other processes may not find a module of the user.
+    is_own = module is not None and module.__name__ != "__main__" and not _is_installed(module)
+    if is_own:
+        by_value.register_pickle_by_value(module)
+    try:
+        content: bytes = by_value.dumps(function)
+    finally:
+        if is_own:
+            by_value.unregister_pickle_by_value(module)
     return content
+
+
+def _is_installed(module: ModuleType) -> bool:
+    """Return True for a module of Python or of an installed package."""
+    folders = (get_path(name) for name in ("stdlib", "purelib", "platlib"))
+    file = getattr(module, "__file__", None)
+    return file is None or any(map(Path(file).is_relative_to, folders))
 
 
 def own_functions(functions: Mapping[str, Callable[[Result], object]]) -> tuple[OwnFunction, ...]:
