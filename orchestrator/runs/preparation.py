@@ -73,7 +73,7 @@ FALLBACK_STOP_TIME = 1.0
 _STACK_LEVEL = 5
 
 #: Number of steps of a run without an end.
-_MANY = 500_000_000
+MANY_STEPS = 500_000_000
 
 # Loading
 
@@ -447,7 +447,7 @@ def prepare(
         coupling = "solve"
     start_time = system.start_time or 0.0
     if stop_time is None:
-        stop_time = start_time + _MANY * step
+        stop_time = start_time + MANY_STEPS * step
     experiment = Experiment(stop_time, step, order, start_time, coupling)
     isolation = Isolation.of(request.isolate, request.step_timeout)
     # A program is not a loop of FMUs.

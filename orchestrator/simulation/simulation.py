@@ -26,13 +26,10 @@ from orchestrator.cosim import (
 )
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.program.session import ProgramSession
-from orchestrator.runs.preparation import Prepared, prepare_options
+from orchestrator.runs.preparation import MANY_STEPS, Prepared, prepare_options
 from orchestrator.runs.request import PROGRAM, SystemOptions, method_takes_keywords, option
 from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import routes
-
-#: More steps than anybody makes on one grid.
-_MANY = 500_000_000
 
 #: Loops of a simulation.
 Loop = Literal["auto", "program", "compiled", "python"]
@@ -371,7 +368,7 @@ class Simulation:
     def _regrid(self, start: float, step: float) -> None:
         """Continue with steps of a length, without an end."""
         experiment = self._session.experiment
-        end = start + _MANY * step
+        end = start + MANY_STEPS * step
         self._session.regrid(replace(experiment, start_time=start, step=step, stop_time=end))
 
     def _advance(self, until: int) -> None:

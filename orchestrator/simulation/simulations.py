@@ -10,20 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from orchestrator.cosim import Order, PortName, System, Value, Variable
+from orchestrator.cosim import Order, PortName, System
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.workers import cores
 from orchestrator.program.session import Place, ProgramSession, stepped_program
-from orchestrator.runs.preparation import prepare_options
+from orchestrator.runs.preparation import MANY_STEPS, prepare_options
 from orchestrator.runs.request import SystemOptions
 from orchestrator.runs.scenario import routes
 from orchestrator.simulation.simulation import Settable, ports_of, settables_of
 
 #: Least number of simulations for which a further thread is worth its start.
 _WORTH_A_THREAD = 128
-
-#: More steps than anybody makes.
-_MANY = 500_000_000
 
 
 class Simulations:
@@ -219,7 +216,7 @@ class Simulations:
         settables = self._settables[name]
         columns = _columns(name, values, self.n, len(settables))
         for settable, column in zip(settables, columns, strict=True):
-            numbers = _numbers(settable.variable, column, settable.port)
+            numbers = self._numbers(settable, column)
             if not settable.targets:
                 self._tune(settable.port, numbers)
             for target, change in settable.targets:
@@ -228,6 +225,21 @@ class Simulations:
                     arriving = np.array([float(change(value)) for value in numbers.tolist()])
                 self._override(target, arriving)
         self._is_stale = True
+
+    def _numbers(self, settable: Settable, values: np.ndarray) -> np.ndarray:
+        """Return the numbers of some values of a port.
+
+        Raises:
+            InputError: one is not of its type, or out of range.
+
+        """
+        if values.dtype.kind in "fiu":
+            numbers: np.ndarray = values.astype(float)
+            # NaN is not in the range, either.
+            if ((settable.least <= numbers) & (numbers <= settable.most)).all():
+                return numbers
+        number, port = self._program.number, settable.port
+        return np.array([number(port, settable.taken(value)) for value in values.tolist()])
 
     def _override(self, target: PortName, numbers: np.ndarray) -> None:
         i = self._program.inputs[target]
@@ -293,10 +305,12 @@ class Simulations:
                 if port not in self._program.settables:
                     raise InputError(f"{port} is not a parameter")
                 number, _ = self._program.settables[port]
-                values[numbers, number] = _numbers(self._system.variable(port), column, port)
+                settable = Settable.of(self._system, port)
+                values[numbers, number] = self._numbers(settable, column)
+        end = self._start_time + MANY_STEPS * self.step_size
         self._library.begin_all(
             self._memory.ctypes.data, len(numbers), numbers.ctypes.data, values.ctypes.data,
-            self._start_time, self.step_size, self._start_time + _MANY * self.step_size, _MANY,
+            self._start_time, self.step_size, end, MANY_STEPS,
         )  # fmt: skip
         self._is_stale = False
         failed = numbers[self.failed[numbers]]
@@ -344,25 +358,3 @@ def _columns(name: str, values: Any, n: int, n_ports: int) -> np.ndarray:
         shape = f"({n}, {n_ports})" if n_ports > 1 else f"({n},)"
         raise InputError(f"{name}: takes an array of shape {shape}, not {array.shape}")
     return np.broadcast_to(array, (n_ports, n))
-
-
-def _numbers(variable: Variable, values: np.ndarray, port: PortName) -> np.ndarray:
-    """Return the numbers of some values of a port.
-
-    Raises:
-        InputError: one is not of its type, or out of range.
-
-    """
-    if variable.family == "Real" and variable.type != "Float32" and values.dtype.kind in "fiu":
-        least, most = variable.range
-        numbers: np.ndarray = values.astype(float)
-        # NaN is not in the range, either.
-        if ((least <= numbers) & (numbers <= most)).all():
-            return numbers
-    typed = [variable.typed(value, str(port)) for value in values.tolist()]
-    return np.array([_number(variable, value) for value in typed])
-
-
-def _number(variable: Variable, value: Value) -> float:
-    """Return the number of a value; an item of an Enumeration has one."""
-    return float(variable.items[value] if isinstance(value, str) else value)
