@@ -146,7 +146,7 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):  # type: ignore[misc]
         for loop, start in zip(self._loops, self._start, strict=True):
             move = self._random.uniform(-self._moves, self._moves)
             drawn[f"{loop.vehicle}.eta0"] = (start + move).tolist()
-            drawn[f"{loop.vehicle}.noise.seed"] = int(self._random.integers(_SEEDS))
+            drawn[loop.seed] = int(self._random.integers(_SEEDS))
         self._simulation.reset(drawn)
         self.agents = [*self.possible_agents]
         self._left = self._n_actions
@@ -223,6 +223,7 @@ class Formation(ParallelEnv[str, np.ndarray, np.ndarray]):  # type: ignore[misc]
 
 def _needs(loop: Loop) -> tuple[str, ...]:
     """Return signals and parameters that the agent of a vehicle needs."""
-    at_vehicle = (f"{loop.vehicle}.{name}" for name in ("y.x", "eta0.x", "noise.seed"))
+    at_vehicle = (f"{loop.vehicle}.{name}" for name in ("y.x", "eta0.x"))
     at_planner = (f"{loop.planner}.{name}" for name in ("dy_d.x", "ddy_d.x"))
-    return (*loop.commanded, *loop.limits, *loop.posture, *loop.y_d, *at_vehicle, *at_planner)
+    signals = (*loop.commanded, *loop.limits, *loop.posture, *loop.y_d, loop.seed)
+    return (*signals, *at_vehicle, *at_planner)
