@@ -4,8 +4,8 @@ import { commandName, inSteps, limits, smallestDistance, trackingError } from ".
 import { escaped } from "./text";
 import type { Common, Run, Units, VehicleData } from "./types";
 
-/** Colour and style of a line: of a controller, a true or wanted value, or all vehicles. */
-export type Style = "first" | "second" | "reference" | "first-of-all" | "second-of-all";
+/** Colour and style of a line: of a controller, a true value, or all vehicles. */
+export type Style = "first" | "second" | "true" | "first-of-all" | "second-of-all";
 
 export interface Panel {
   /** HTML. */
@@ -72,7 +72,7 @@ export function sections(
       note: "",
       named: true,
       panels: Object.entries(units.dy).map(([axis, unit]) => ({
-        styles: ["first", "reference"],
+        styles: ["first", "true"],
         names: ["estimated by the observer", "true"],
         title: `<i>y&#775;<sub>${axis}</sub></i>`,
         unit,
@@ -197,14 +197,4 @@ function groupsOf(columns: Units): [string, string[]][] {
 
 function known(result: Run | undefined, name: string): Float64Array | undefined {
   return result?.has(name) ? result.column(name) : undefined;
-}
-
-/** Returns columns row by row, a number of each column. */
-export function interleaved(columns: readonly Float64Array[]): Float64Array {
-  const width = columns.length;
-  const values = new Float64Array(width * columns[0].length);
-  columns.forEach((column, k) => {
-    for (let row = 0; row < column.length; row++) values[width * row + k] = column[row];
-  });
-  return values;
 }

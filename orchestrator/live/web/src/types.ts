@@ -228,18 +228,28 @@ export interface Run {
   readonly metrics: readonly Metrics[];
 }
 
-/** A run that the page has made: rows at t = 0 and after each step, and all ports but `faults`. */
-export interface Result extends Run {
-  /** Outputs that are 0 in every row, by the number of columns before them in result.csv. */
-  readonly faults: ReadonlyMap<number, string>;
-  /** Row by row: the time, then the columns. */
-  readonly table: Float64Array;
+/** What a run of the page leaves, as plain data. */
+export interface Outcome {
+  readonly rows: number;
+  /** Columns one after the other, the time first. */
+  readonly table: Float64Array<ArrayBuffer>;
+  readonly parameters: Values;
+  readonly happened: readonly Occurrence[];
+  readonly metrics: readonly Metrics[];
   /** Messages of components, `controller: ...`. */
   readonly messages: readonly string[];
+  /** Warnings about valid but misleading numbers. */
+  readonly cautions: readonly string[];
   /** Why the run failed; it keeps the rows before that. */
   readonly failure?: string;
   /** Why it ended early without a failure. */
   readonly remark?: string;
+}
+
+/** A run that the page has made: rows at t = 0 and after each step, and all ports but `faults`. */
+export interface Result extends Run, Outcome {
+  /** Outputs that are 0 in every row, by the number of columns before them in result.csv. */
+  readonly faults: ReadonlyMap<number, string>;
 }
 
 /** Options of a run. */
@@ -249,8 +259,8 @@ export interface Options {
   /** [s] */
   readonly step: number;
   readonly events?: readonly EventData[];
-  /** A result that is no longer shown, whose memory the run may reuse. */
-  readonly spare?: Result | undefined;
+  /** Memory of a table that is no longer shown, which the run may reuse. */
+  readonly spare?: ArrayBuffer | undefined;
 }
 
 /** Members of each index, by index, in the order of `IndexData.units`. */
