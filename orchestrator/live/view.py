@@ -16,7 +16,7 @@ from orchestrator.vehicle.indices import SMALLEST_DISTANCE, VEHICLES, metrics
 from orchestrator.vehicle.signals import Loop, real_parameter
 
 #: Most numbers in a page, of all runs together; rows of longer runs are skipped.
-_NUMBERS = 800_000
+_NUMBERS = 400_000
 
 #: Share of its values below which a column's range needs doubles.
 _NARROW = 1e-3
@@ -96,8 +96,7 @@ def _vehicles(run: Drawn) -> list[Loop]:
 
 
 def _drawn(run: Drawn) -> Iterator[str]:
-    """Yield notes on the size of the drawn vehicles and on parts that are left out."""
-    yield "Vehicles are drawn larger than they are"
+    """Yield notes on parts that are left out."""
     for loop in run.loops:
         of_vehicle = f"{loop.name}: " if len(run.loops) > 1 else ""
         for name, needs in _SHOWN.items():

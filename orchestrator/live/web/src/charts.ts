@@ -160,7 +160,8 @@ class Chart {
 
   /** Returns the range of times, from the chosen beginning if the run lasts longer. */
   #times(low: number, high: number): [number, number] {
-    return [this.#from < high ? Math.max(low, this.#from) : low, high];
+    const end = Math.max(high, this.#lines.until ?? high);
+    return [this.#from < end ? Math.max(low, this.#from) : low, end];
   }
 
   /** Returns the range of values, with limits that they come near to. */
@@ -312,7 +313,9 @@ class Chart {
 
   /** Draws again with other colours. */
   repaint(): void {
-    if (!this.#stale) this.#plot.redraw(false);
+    if (this.#stale) return;
+    this.#plot.redraw(false);
+    this.#point();
   }
 
   show(time: number): void {

@@ -29,7 +29,7 @@ const NOTICE = 4000;
 /** Most unknown parts of a link in a notice. */
 const NAMED = 5;
 
-/** Waits for the next frame; hidden pages have none. */
+/** Waits for the next frame; a hidden page draws none, and continues at once. */
 function nextFrame(): Promise<unknown> {
   return document.hidden
     ? Promise.resolve()

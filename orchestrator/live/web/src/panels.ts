@@ -27,6 +27,8 @@ export interface Section {
 /** Values of a panel's lines, with the times of their rows. */
 export interface Lines {
   readonly time: Float64Array;
+  /** End of the chart [s], if it is later than the last row. */
+  readonly until?: number;
   readonly values: readonly (Float64Array | undefined)[];
   /** Limits of a command, if it has any. */
   readonly limits?: readonly [number, number];
@@ -120,8 +122,8 @@ export function lines(
   const whole = longest(results);
   const time = whole?.time ?? new Float64Array(0);
   const rows = Math.max(0, (whole?.rows ?? 0) - 1);
-  /** Times at which steps begin. */
-  const starts = time.subarray(0, rows);
+  /** Times at which steps begin, and the end of the last one. */
+  const inEachStep = { time: time.subarray(0, rows), until: time[rows] ?? 0 };
   const ofEach = <T>(make: (result: Run, chosen: Chosen) => T): (T | undefined)[] =>
     results.map((result, place) => result && make(result, chosen[place]));
   const errors = ofEach((result, { vehicle }) => trackingError(result, vehicle));
@@ -139,17 +141,17 @@ export function lines(
         steps(result, commandName(result, vehicle, member)),
       );
       const ends = whole && limits(whole, chosen[results.indexOf(whole)].vehicle, member);
-      return { time: starts, values, ...(ends ? { limits: ends } : {}) };
+      return { ...inEachStep, values, ...(ends ? { limits: ends } : {}) };
     }),
     Object.keys(units.dy).map((axis) => ({
-      time: starts,
+      ...inEachStep,
       values: [
         steps(results[observed], `${vehicle.controller}.dy_hat.${axis}`),
         known(results[moving], `${vehicle.vehicle}.dy.${axis}`)?.subarray(0, rows),
       ],
     })),
     Object.keys(units.theta_hat).map((k) => ({
-      time: starts,
+      ...inEachStep,
       values: ofEach((result, { vehicle }) =>
         steps(result, `${vehicle.controller}.theta_hat[${k}]`),
       ),

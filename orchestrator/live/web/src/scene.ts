@@ -60,7 +60,7 @@ const OF_SECOND = 0.2;
 
 /** Most of the smallest distance between two vehicles, and least of the largest extent. */
 const OF_DISTANCE = 0.6;
-const LEAST = 0.03;
+const LEAST = 0.045;
 
 /** Most marks of references. */
 const MOST_TARGETS = 1000;
@@ -150,7 +150,7 @@ export class Scene {
     const gl = this.#renderer.gl;
     this.#camera = new Camera(gl, { fov: (HALF * 360) / Math.PI, near: 0.05, far: 50 });
     this.#grid = new Primitives(gl, 400, gl.LINES);
-    this.#target = new Primitives(gl, MOST_TARGETS, gl.POINTS, 7 * this.#renderer.dpr);
+    this.#target = new Primitives(gl, MOST_TARGETS, gl.POINTS, 5 * this.#renderer.dpr);
     this.#waypoints = new Primitives(gl, 400, gl.LINES);
     for (const { mesh } of [this.#grid, this.#target, this.#waypoints]) {
       mesh.setParent(this.#root);
@@ -224,7 +224,7 @@ export class Scene {
     this.draw();
   }
 
-  /** How many times as long as they are vehicles are drawn. */
+  /** Ratio of the length at which vehicles are drawn to their own. */
   get times(): number {
     return this.#times;
   }
@@ -354,8 +354,8 @@ export class Scene {
 
   /** Puts a picture of a size [px] into the scene: on paper a canvas with WebGL is empty. */
   print(width: number, height: number): void {
-    const { style } = this.#host;
-    [style.width, style.height] = [`${width}px`, `${height}px`];
+    const size = `width: ${width}px; height: ${height}px`;
+    this.#host.style.cssText = `flex: none; min-height: 0; max-height: none; ${size}`;
     this.#resize();
     this.#drawNow();
     const { canvas } = this.#renderer.gl;
@@ -368,8 +368,7 @@ export class Scene {
   /** Takes the picture away again. */
   fit(): void {
     this.#picture?.remove();
-    const { style } = this.#host;
-    style.width = style.height = "";
+    this.#host.style.cssText = "";
     this.#resize();
   }
 

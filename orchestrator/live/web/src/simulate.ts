@@ -1,12 +1,14 @@
 // A run of a loop: its times, events and parameters for the program, and its rows.
 
 import { type Agenda, Module, type Reducer, type Refused } from "./program";
+import { namedFor } from "./settings";
 import { general } from "./text";
 import type {
   Action,
   Data,
   EventData,
   LoopData,
+  Metrics,
   Occurrence,
   Options,
   Outcome,
@@ -183,6 +185,9 @@ function whyEnded(events: readonly EventData[], happened: readonly Occurrence[])
   return action.kind === "stop" ? action.why : "";
 }
 
+/** A field in the text of a rule: a name, and the digits of its value. */
+const FIELD = /\{([\w.]+)(?::\.?(\d*)g)?\}/g;
+
 /** Runs loops, here or in a worker; throws `Refusal` if a value or a time is not usable. */
 export interface Runner {
   run(loop: LoopData, values: Values, options: Options): Result | Promise<Result>;
@@ -237,20 +242,41 @@ export class Engine implements Runner {
     const refusal = found.outcome === "refused" ? whyRefused(found.refused, loop) : "";
     if (refusal && found.rows === 0) throw new Refusal(refusal);
     const happened = occurrences(events, found.happened, experiment);
+    const reducers = loop.measured.flatMap((place) => this.data.measured[place]);
+    const indices = new Set(reducers.flatMap(({ isIndex, gives }) => (isIndex ? gives : [])));
     const last = `t = ${general(experiment.time(found.refused.made), 12)} s`;
     return {
       rows: found.rows,
       table: byColumns(found.table, found.rows, spare),
       parameters,
       happened,
-      metrics: found.metrics,
+      metrics: found.metrics.map((all) =>
+        Object.fromEntries(Object.entries(all).filter(([name]) => indices.has(name))),
+      ),
       messages: messages(loop, found.restarts),
-      cautions: [],
+      cautions: this.cautions(loop, found.metrics, parameters),
       ...(refusal && { failure: `stopped at ${last}: ${refusal}` }),
       ...(found.outcome === "ended" && {
         remark: `ended at ${last}: ${whyEnded(events, happened)}`,
       }),
     };
+  }
+
+  /** Returns the warnings of all rules, each once. */
+  private cautions(loop: LoopData, found: readonly Metrics[], parameters: Values): string[] {
+    const texts = this.data.rules.flatMap(({ number, above, text }) =>
+      loop.vehicles.flatMap((vehicle, place) => {
+        const numbers = found[place];
+        if (!(numbers[number]?.[0] > above)) return [];
+        const filled = text.replace(FIELD, (_, name: string, digits?: string) => {
+          const own = namedFor(vehicle, name);
+          if (digits === undefined) return own;
+          return general(Number(numbers[name]?.[0] ?? parameters[own]), Number(digits) || 6);
+        });
+        return [filled];
+      }),
+    );
+    return [...new Set(texts)];
   }
 
   /** Returns the reducers of a vehicle's indices. */

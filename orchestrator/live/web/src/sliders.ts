@@ -1,5 +1,6 @@
 // Sliders: their parameters and headings, and the values of their positions.
 
+import { namedFor } from "./settings";
 import type { VehicleData } from "./types";
 
 /** Positions of a slider, from 0. */
@@ -139,11 +140,7 @@ export const GROUPS: readonly Group[] = [
 
 /** Returns a slider for the components of a vehicle; `GROUPS` has the names of a single vehicle. */
 export function sliderOf(vehicle: VehicleData, slider: Slider): Slider {
-  const names = { ...vehicle, plant: vehicle.vehicle };
-  const named = (text: string) =>
-    text.replace(/\b(plant|controller|planner|disturbance)(?=\.)/, (role) => {
-      return names[role as keyof typeof names];
-    });
+  const named = (text: string) => namedFor(vehicle, text);
   const { spoken } = slider;
   return {
     ...slider,

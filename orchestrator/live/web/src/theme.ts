@@ -43,8 +43,8 @@ export function vehicleColour(text: string): Colour {
 }
 
 /**
- * Gives the lines of the first controller a vehicle's colour, and those of the second the text's;
- * undefined: each its own.
+ * Gives the lines of the first controller a vehicle's colour, and lines of the second the colour of
+ * text; undefined: each its own.
  */
 export function colourLines(text: string | undefined): void {
   known.clear();

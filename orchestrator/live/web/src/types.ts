@@ -162,10 +162,11 @@ export interface IndexData {
   readonly meaning: string;
 }
 
-/** A reducer, which makes indices of a vehicle from rows. */
+/** A reducer, which makes indices of a vehicle from rows, or numbers for rules. */
 export interface ReducerData {
   /** Name in the module. */
   readonly name: string;
+  readonly isIndex: boolean;
   /** Names of columns and parameters, or constants. */
   readonly takes: readonly (string | number)[];
   /** Name of the index of each result. */
@@ -188,6 +189,16 @@ export interface Common {
   readonly hull: Hull;
 }
 
+/** A rule for a warning. */
+interface RuleData {
+  /** Result of a reducer. */
+  readonly number: string;
+  /** Value above which it warns. */
+  readonly above: number;
+  /** `{name}` is the name of a parameter; `{name:g}` its value, or another result. */
+  readonly text: string;
+}
+
 /** Data of the live page, besides the script and modules. */
 export interface Data extends Common {
   /** The preset that is shown first. */
@@ -197,6 +208,7 @@ export interface Data extends Common {
   readonly presets: readonly Preset[];
   /** Indices of vehicles. */
   readonly measured: readonly (readonly ReducerData[])[];
+  readonly rules: readonly RuleData[];
 }
 
 /** Beginning or end of an event in a run. */
@@ -228,7 +240,7 @@ export interface Run {
   readonly metrics: readonly Metrics[];
 }
 
-/** What a run of the page leaves, as plain data. */
+/** Rows and messages of a run that the page has made, as plain data. */
 export interface Outcome {
   readonly rows: number;
   /** Columns one after the other, the time first. */

@@ -11,7 +11,7 @@ interface Parts {
 
 /** A run that the page asks for. */
 interface Request {
-  /** Number of the loop among those of all presets. */
+  /** Number of the loop among the loops of all presets. */
   readonly loop: number;
   readonly values: Values;
   readonly options: Options;

@@ -1,5 +1,6 @@
 // Writes the rows of presets: `node rows.mjs ENGINE MODULES DATA FOLDER`, with commas between the
-// modules. Writes a file of doubles for each loop, column by column, and all else about the runs to the output.
+// modules. Writes a file of doubles for each loop, column by column, and all else about the runs to
+// the output.
 import { readFileSync, writeFileSync } from "node:fs";
 import { pathToFileURL } from "node:url";
 
