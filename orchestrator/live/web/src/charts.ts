@@ -284,7 +284,14 @@ class Chart {
     this.root.hidden = !lines.values.some((values) => values);
     const names = this.#panel.names.filter((_, k) => lines.values[k]);
     this.#host.setAttribute("aria-label", `${this.#caption} over time: ${names.join(", ")}`);
-    this.#redrawIfVisible();
+    this.#stale = true;
+  }
+
+  /** Draws the chart if it is in sight and has changed; tells whether it does. */
+  refresh(): boolean {
+    const isDue = this.#stale && this.#visible && !this.root.hidden;
+    if (isDue) this.#redraw();
+    return isDue;
   }
 
   #redrawIfVisible(): void {
@@ -370,6 +377,9 @@ export function rowAt(times: Float64Array, time: number): number {
 /** The sections of charts. */
 export class Charts {
   #charts: Chart[][] = [];
+  #isRefreshing = false;
+  /** Number of the section that was drawn last. */
+  #last = -1;
   #from: number;
   readonly #host: HTMLElement;
   readonly #scrub: (time: number) => void;
@@ -385,6 +395,7 @@ export class Charts {
     // uPlot keeps a reference to every plot until it is destroyed.
     for (const chart of this.#charts.flat()) chart.destroy();
     this.#host.replaceChildren();
+    this.#last = -1;
     this.#charts = sections.map(({ title, note, named, panels }, place) => {
       const aside = make("span", "note", note);
       const [{ names, styles }] = panels;
@@ -426,6 +437,22 @@ export class Charts {
       parent?.querySelectorAll<HTMLElement>(".sample").forEach((sample, k) => {
         sample.hidden = lines[section].every(({ values }) => values[k] === undefined);
       });
+    });
+    this.#refresh();
+  }
+
+  /** Draws the changed charts a section at a time, so that input never waits for all of them. */
+  #refresh(): void {
+    if (this.#isRefreshing) return;
+    this.#isRefreshing = true;
+    setTimeout(() => {
+      this.#isRefreshing = false;
+      // In turn, so that each is drawn even if all change again before.
+      for (let k = 0; k < this.#charts.length; k++) {
+        this.#last = (this.#last + 1) % this.#charts.length;
+        const drawn = this.#charts[this.#last].map((chart) => chart.refresh());
+        if (drawn.includes(true)) return this.#refresh();
+      }
     });
   }
 
