@@ -99,8 +99,7 @@ class Chart {
       ([{ isIntersecting }]) => {
         this.#visible = isIntersecting;
         if (!isIntersecting || this.root.hidden) return;
-        if (this.#stale) this.#redraw();
-        else this.#point();
+        if (!this.refresh()) this.#point();
       },
       { rootMargin: "60px" },
     ).observe(this.root);
@@ -289,14 +288,10 @@ class Chart {
 
   /** Draws the chart if it is in sight and has changed; tells whether it does. */
   refresh(): boolean {
-    const isDue = this.#stale && this.#visible && !this.root.hidden;
+    const hasRows = this.#lines.time.length > 0;
+    const isDue = this.#stale && this.#visible && hasRows && !this.root.hidden;
     if (isDue) this.#redraw();
     return isDue;
-  }
-
-  #redrawIfVisible(): void {
-    if (this.#visible && !this.root.hidden) this.#redraw();
-    else this.#stale = true;
   }
 
   #redraw(): void {
@@ -315,7 +310,8 @@ class Chart {
   /** Lets the chart begin at another time [s], so that small values can be seen after large ones. */
   begin(from: number): void {
     this.#from = from;
-    this.#redrawIfVisible();
+    this.#stale = true;
+    this.refresh();
   }
 
   /** Draws again with other colours. */
