@@ -82,7 +82,7 @@ def view_page(
         units = {k: v for each, _ in pairs for k, v in each.run.result.header.units.items()}
         shown = dict.fromkeys(chain.from_iterable(names))
         data["columns"] = {name: printed_unit(str(units.get(name, ""))) for name in shown}
-    notes = [*(_drawn(stored[0].run) if n else ()), *_endings([each.run for each in stored])]
+    notes = [*(_left_out(stored[0].run) if n else ()), *_endings([each.run for each in stored])]
     text = "".join(f"{note}. " for note in notes)
     return assemble("view", data, binary, {"title": title, "notes": text}, hear)
 
@@ -95,7 +95,7 @@ def _vehicles(run: Drawn) -> list[Loop]:
     return loops
 
 
-def _drawn(run: Drawn) -> Iterator[str]:
+def _left_out(run: Drawn) -> Iterator[str]:
     """Yield notes on parts that are left out."""
     for loop in run.loops:
         of_vehicle = f"{loop.name}: " if len(run.loops) > 1 else ""

@@ -91,16 +91,17 @@ export class Display {
   /** Plays the runs once they are seen; with a time [s], or if motion is unwanted, shows it still. */
   start(time?: number): void {
     const { player } = this;
+    const stage = element("stage");
     if (time !== undefined) player.seek(time);
-    else if (!matchMedia("(prefers-reduced-motion: reduce)").matches) {
-      player.seek(-Infinity);
-      const seen = new IntersectionObserver(([{ isIntersecting }]) => {
-        if (!isIntersecting) return;
-        seen.disconnect();
-        if (!player.isPlaying && player.isAtStart) player.toggle();
-      });
-      seen.observe(element("stage"));
-    }
+    if (time !== undefined || stage.hidden) return;
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+    player.seek(-Infinity);
+    const seen = new IntersectionObserver(([{ isIntersecting }]) => {
+      if (!isIntersecting) return;
+      seen.disconnect();
+      if (!player.isPlaying && player.isAtStart) player.toggle();
+    });
+    seen.observe(stage);
   }
 
   /** Makes the charts of runs, for loops in the order in which they are drawn. */
