@@ -28,6 +28,7 @@ from nbclient import NotebookClient
 from fmus.discovery import components
 from orchestrator.live import presets
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.mathematics import typeset
 
 ROOT = Path(__file__).parents[1]
 
@@ -108,8 +109,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Remove the roles of names in docstrings."""
-    return _ROLE.sub("", content)
+    """Typeset the mathematics, and remove the roles of names in docstrings."""
+    return _ROLE.sub("", typeset(content))
 
 
 def _with_plain_bars(row: re.Match[str]) -> str:

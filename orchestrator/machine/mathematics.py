@@ -1,0 +1,44 @@
+"""Mathematics of pages as MathML, which browsers draw without scripts or fonts from a network."""
+
+from __future__ import annotations
+
+import re
+from html import unescape
+
+from math_core import LatexError, LatexToMathML
+
+from orchestrator.machine.errors import InputError
+
+_INLINE = re.compile(r"\$<code>([^<]*)</code>\$")
+
+#: As MarkdownIt and as the site's Markdown write a fence.
+_DISPLAYED = re.compile(
+    r'<pre(?:><code class="language-math"| class="language-math"><code)>([^<]*)</code></pre>'
+)
+
+#: A wide formula scrolls in it, also by keys.
+_BOX = '<div class="math" tabindex="0">{}</div>'
+
+_CONVERTER = LatexToMathML(fancy_error=False)
+
+
+def typeset(page: str) -> str:
+    """Typeset the LaTeX on a page in HTML.
+
+    In Markdown it is written as GitHub reads it: in code between dollar signs, or displayed in a
+    fence whose language is `math`.
+
+    Raises:
+        InputError: some of it is not LaTeX.
+
+    """
+    page = _DISPLAYED.sub(lambda code: _BOX.format(_mathml(code[1], True)), page)
+    return _INLINE.sub(lambda code: _mathml(code[1], False), page)
+
+
+def _mathml(code: str, is_displayed: bool) -> str:
+    latex = unescape(code)
+    try:
+        return _CONVERTER.convert_with_local_state(latex, displaystyle=is_displayed)
+    except LatexError as error:
+        raise InputError(f"not LaTeX: {' '.join(latex.split())}: {error}") from None
