@@ -60,6 +60,7 @@ BOOSTS = {
 _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 _PRESET = re.compile(r"<!-- live: (([\w-]+)\S*) -->")
 _ROW, _CODE = re.compile(r"^\|.*$", re.MULTILINE), re.compile(r"`[^`]+`")
+_DISPLAYED = '<div class="math"'
 _ROLE = re.compile(r":(class|data|func|mod):(?=<code>)")
 
 log = logging.getLogger(f"mkdocs.hooks.{__name__}")
@@ -109,8 +110,9 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Typeset the mathematics, and remove the roles of names in docstrings."""
-    return _ROLE.sub("", typeset(content))
+    """Typeset mathematics, whose displays are not searched, and remove roles in docstrings."""
+    content = typeset(content).replace(_DISPLAYED, f"{_DISPLAYED} data-search-exclude")
+    return _ROLE.sub("", content)
 
 
 def _with_plain_bars(row: re.Match[str]) -> str:
