@@ -251,7 +251,7 @@ def fmu_documents(source: Source, kind: str = PYTHON, fmi: str = "2") -> dict[st
 def html_of(title: str, page: str, citation: str = "") -> str:
     """Render a page in Markdown as one HTML file."""
     body = typeset(MarkdownIt("commonmark").enable("table").render(page))
-    body = body.replace("<table>", '<div class="table"><table>')
+    body = body.replace("<table>", '<div class="table" tabindex="0"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(
         title=title, citation=citation, body=body

@@ -36,7 +36,7 @@ def test_a_fence_of_another_language_is_code():
     assert code.tag == "pre" and code.text_content() == "$a$\n"
 
 
-def test_what_is_not_latex_is_refused_in_one_line():
+def test_text_that_is_not_latex_is_refused_in_one_line():
     with pytest.raises(InputError, match=re.escape(r"not LaTeX: \alhpa + 1: ")) as refused:
         page("$`\\alhpa +\n1`$")
     assert "\n" not in str(refused.value)
