@@ -5,7 +5,10 @@ from __future__ import annotations
 import re
 from html import unescape
 
-from math_core import LatexError, LatexToMathML
+try:
+    import math_core
+except ImportError:  # not every machine can have it
+    math_core = None  # type: ignore[assignment]
 
 from orchestrator.machine.errors import InputError
 
@@ -19,19 +22,21 @@ _DISPLAYED = re.compile(
 #: A wide formula scrolls in it, also by keys.
 _BOX = '<div class="math" tabindex="0">{}</div>'
 
-_CONVERTER = LatexToMathML(fancy_error=False)
+_CONVERTER = math_core and math_core.LatexToMathML(fancy_error=False)
 
 
 def typeset(page: str) -> str:
     """Typeset the LaTeX on a page in HTML.
 
     In Markdown it is written as GitHub reads it: in code between dollar signs, or displayed in a
-    fence whose language is `math`.
+    fence whose language is `math`. Where math-core cannot be had it stays LaTeX.
 
     Raises:
         InputError: some of it is not LaTeX.
 
     """
+    if math_core is None:
+        return page
     page = _DISPLAYED.sub(lambda code: _BOX.format(_mathml(code[1], True)), page)
     return _INLINE.sub(lambda code: _mathml(code[1], False), page)
 
@@ -40,5 +45,5 @@ def _mathml(code: str, is_displayed: bool) -> str:
     latex = unescape(code)
     try:
         return _CONVERTER.convert_with_local_state(latex, displaystyle=is_displayed)
-    except LatexError as error:
+    except math_core.LatexError as error:
         raise InputError(f"not LaTeX: {' '.join(latex.split())}: {error}") from None
