@@ -80,9 +80,10 @@ RULES = (
         CHATTERING,
         "robust_step",
         _REVERSES,
-        "the robust term chatters: with theta_hat[1] up to {largest_bound:.3g} N and "
-        "{controller.eps_t} = {controller.eps_t:g} W its step gain h p is {robust_step:.3g}, and "
-        f"above {_REVERSES:g} its sign changes in every step; raise eps_t or take shorter steps",
+        "the robust term chatters: its step gain h p is {robust_step:.3g}, and above "
+        f"{_REVERSES:g} its sign changes in every step "
+        "(theta_hat[1] reaches {largest_bound:.3g} N, {controller.eps_t} = {controller.eps_t:g} W)"
+        "; raise eps_t or reduce the step",
     ),
     Rule(
         VERTICAL,

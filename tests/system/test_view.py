@@ -246,7 +246,7 @@ def test_comparison_is_played_with_its_events(results, tmp_path, chromium):
     assert "PD" not in shown(table)
     now = "parseFloat(document.getElementById('now').textContent)"
     end = time.monotonic() + 60.0
-    while not 0.0 < shown(now):
+    while not shown(now) > 0.0:
         assert time.monotonic() < end
     shown("document.getElementById('play').click()")
     assert 0.0 < shown(now) < 4.0
