@@ -46,11 +46,17 @@ PAGES = {
 
 LIVE = "live.html"
 
-#: Weights of pages in the search, by the beginning of their place.
+#: Weights of pages in the search, by the beginning of their place; the first that fits.
 BOOSTS = {
+    # These name every guide.
+    "index.md": 0.3,
+    "how-to/README.md": 0.3,
+    "explanation/README.md": 0.3,
     "tutorials/": 2.0,
     "how-to/": 2.0,
     "explanation/kinds.md": 2.0,
+    "explanation/component.md": 2.0,
+    "contributing/testing.md": 0.5,
     "contributing/": 0.2,
     "explanation/architecture.md": 0.5,
     "reference/fmi-answers.md": 0.5,
@@ -67,7 +73,7 @@ WIDE = {
 _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 _PRESET = re.compile(r"<!-- live: (([\w-]+)\S*) -->")
 _ROW, _CODE = re.compile(r"^\|.*$", re.MULTILINE), re.compile(r"`[^`]+`")
-_TABLE = re.compile(r"(<table.*?</thead>)(.*?</table>)", re.DOTALL)
+_TABLE = re.compile(r"(<table[^>]*>\s*<thead>.*?</thead>)(.*?</table>)", re.DOTALL)
 _CELL = re.compile(r"<th\b[^>]*>(.*?)</th>", re.DOTALL)
 _LONG_CODE = re.compile(r"(?<=<code>)[^<]{40,}(?=</code>)")
 _BREAK = re.compile(r"(?<=[/:,+|_ ])(?=\w)")
@@ -103,8 +109,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Point links to the site's pages and to the live page."""
     place = page.file.src_uri
-    [boost] = [n for beginning, n in BOOSTS.items() if place.startswith(beginning)] or [1.0]
-    page.meta["search"] = {"boost": boost}
+    boosts = (n for beginning, n in BOOSTS.items() if place.startswith(beginning))
+    page.meta["search"] = {"boost": next(boosts, 1.0)}
     page.meta["hide"] = WIDE.get(place, [])
     markdown = linked(markdown, place, files)
     up = posixpath.relpath(LIVE, posixpath.dirname(place) or ".")
