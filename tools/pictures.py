@@ -9,13 +9,17 @@ from __future__ import annotations
 
 import argparse
 from io import BytesIO
+from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
+from mpl_toolkits.mplot3d.axes3d import Axes3D
+from mpl_toolkits.mplot3d.proj3d import proj_transform
 from PIL import Image, ImageOps
 
 from orchestrator.commands.main import main as auv_fmu
@@ -50,9 +54,8 @@ _SMALL, _SMALL_COLOURS = (720, 480), 32
 #: Resolution of small pictures of scenarios, for lines of the width of a figure.
 _SMALL_DPI = 170
 
-#: Places of the two panels of a small picture: the box of a path in space has wide margins.
-_LEFT: dict[str, Any] = {"left": -0.09, "right": 0.62, "bottom": -0.1, "top": 1.1}
-_LEFT_FLAT: dict[str, Any] = {"left": 0.03, "right": 0.5, "bottom": 0.05, "top": 0.95}
+#: Places of the two panels of a small picture.
+_LEFT: dict[str, Any] = {"left": 0.03, "right": 0.51, "bottom": 0.05, "top": 0.95}
 _RIGHT: dict[str, Any] = {"left": 0.56, "right": 0.97, "bottom": 0.05, "top": 0.95}
 
 #: Height of the heading of a study's figure [px].
@@ -101,9 +104,9 @@ def main() -> None:
 def _without_words(folder: Path, scenario: Scenario) -> Image.Image:
     """Small picture of a run: its path on the left, and beside it what is worth a look."""
     runs = [read_result(path) for path in (folder, *(f for f in folder.iterdir() if f.is_dir()))]
-    left, place, right = PATH, _LEFT, COMMANDS
+    left, right = PATH, COMMANDS
     if scenario.vehicles:
-        left, place, right = FLEET_FROM_ABOVE, _LEFT_FLAT, DISTANCES
+        left, right = FLEET_FROM_ABOVE, DISTANCES
     elif scenario.figure.startswith("open-loop"):
         *_, (right, _) = FIGURES[scenario.figure][""]
     image = BytesIO()
@@ -111,14 +114,31 @@ def _without_words(folder: Path, scenario: Scenario) -> Image.Image:
         width, height = _SMALL
         figure = Figure(figsize=(width / _SMALL_DPI, height / _SMALL_DPI), dpi=_SMALL_DPI)
         figure.set_layout_engine("none")
-        for panel, cell in ((left, place), (right, _RIGHT)):
-            panel.draw(Cell(figure, figure.add_gridspec(1, 1, **cell)[0]), runs)
+        for panel, place in ((left, _LEFT), (right, _RIGHT)):
+            panel.draw(Cell(figure, figure.add_gridspec(1, 1, **place)[0]), runs)
         for axes in figure.axes:
             axes.tick_params(length=0, labelcolor="none")
             for words in axes.findobj(lambda part: isinstance(part, (Text, Legend))):
                 words.set_visible(False)
+        if left is PATH:
+            _fill(figure.axes[0])
         figure.savefig(image, dpi="figure")
     return Image.open(image).convert("RGB").quantize(_SMALL_COLOURS, kmeans=1)
+
+
+def _fill(axes: Axes3D) -> None:
+    """Let the box of a path in space fill its place, in which it has wide margins."""
+    place = axes.get_position(original=True)
+    axes.apply_aspect()
+    shown = axes.get_position()
+    corners = np.array([*product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
+    x, y, _ = proj_transform(*corners.T, axes.get_proj())
+    to_figure = axes.transData - axes.figure.transFigure
+    points = to_figure.transform(np.column_stack([x, y]))
+    low, high = points.min(axis=0), points.max(axis=0)
+    scale = min(place.size / (high - low))
+    start = (place.min + place.max) / 2 + scale * (shown.min - (low + high) / 2)
+    axes.set_position((*start, *(scale * shown.size)))
 
 
 def _below_heading(picture: Image.Image) -> Image.Image:
