@@ -92,9 +92,11 @@ def test_export_with_fmi_3_is_an_ssp_2(workplace: Path):
 
 
 @pytest.fixture
-def any_platform(native: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def any_platform(
+    native: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     """A build of FMUs that compiles nothing: each platform asked for has an empty library."""
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
 
     def built(*options: str) -> dict[str, bytes]:
         asked = options[options.index("--platforms") + 1].split(",")
