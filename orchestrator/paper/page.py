@@ -16,6 +16,7 @@ from urllib.parse import unquote
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
+from PIL import Image
 
 from auv_fmu.language.quantities import TAU
 from orchestrator.figures.style import printed_unit
@@ -164,7 +165,10 @@ def _embed_pictures(tokens: Sequence[Token], folder: Path) -> None:
             file = (folder / unquote(str(part.attrGet("src")))).resolve()
             if file.is_relative_to(folder.resolve()) and file.is_file():
                 content = base64.b64encode(file.read_bytes()).decode()
-                part.attrs |= {"loading": "lazy", "src": f"data:image/png;base64,{content}"}
+                with Image.open(file) as opened:
+                    # Links to headings below lead there before the picture is drawn.
+                    size = {"width": opened.width, "height": opened.height}
+                part.attrs |= {"loading": "lazy", "src": f"data:image/png;base64,{content}", **size}
             else:
                 part.type = "text"
 

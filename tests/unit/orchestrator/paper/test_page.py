@@ -5,6 +5,7 @@ import re
 
 import pytest
 from markdown_it import MarkdownIt
+from PIL import Image
 
 from orchestrator.paper.page import (
     actuator_values,
@@ -60,9 +61,11 @@ def test_cells_name_their_columns_and_verdicts_their_kind(tmp_path):
 
 
 def test_pictures_are_within_the_page_and_lead_to_their_files(tmp_path):
-    (tmp_path / "a.png").write_bytes(b"pixels")
+    file = tmp_path / "a.png"
+    Image.new("P", (3, 2)).save(file)
     page = html("# T\n\n" + picture("one", "a.png"), tmp_path)
-    assert f"data:image/png;base64,{base64.b64encode(b'pixels').decode()}" in page
+    assert f"data:image/png;base64,{base64.b64encode(file.read_bytes()).decode()}" in page
+    assert 'width="3" height="2"' in page
     assert '<a href="a.png">' in page
     assert 'src="a.png"' not in page
 
