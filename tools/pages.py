@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import ast
+import csv
 import json
 import re
 import textwrap
@@ -150,6 +151,7 @@ def files() -> dict[Path, str]:
         "explanation/language.md": {"mathematics": mathematics()},
         "gallery.md": gallery(),
         "reference/command-line.md": command_line(),
+        "reference/compatibility.md": {"checkers": compatibility()},
         "reference/components/README.md": {"components": bundle()},
         "reference/examples.md": examples(),
         "explanation/ready-studies.md": {
@@ -164,6 +166,28 @@ def files() -> dict[Path, str]:
         DOCS / "schemas" / "scenario.json": _json(ScenarioFile),
         DOCS / "schemas" / "study.json": _json(StudyFile),
     }
+
+
+def compatibility() -> str:
+    """Table of the checkers' results, with a row for each FMU of the bundle."""
+    with (DOCS / "reference" / "compatibility.csv").open(encoding="utf-8", newline="") as file:
+        lines = [*csv.DictReader(file)]
+    found = defaultdict[str, defaultdict[str, dict[str, str]]](lambda: defaultdict(dict))
+    for line in lines:
+        checker, form = f"{line['checker']} {line['version']}", f"{line['kind']} {line['fmi']}"
+        found[line["fmu"]][checker][form] = line["result"]
+    rows = [[fmu, *map(_common, checkers.values())] for fmu, checkers in found.items()]
+    return table(["FMU", *next(iter(found.values()))], rows)
+
+
+def _common(results: Mapping[str, str]) -> str:
+    """Return the result of all forms of an FMU, the largest of numbers, or each result."""
+    if len(different := {*results.values()}) == 1:
+        return different.pop()
+    try:
+        return max(different, key=float)
+    except ValueError:
+        return "; ".join(f"{form}: {result}" for form, result in results.items())
 
 
 def page_of(component: str) -> Path:

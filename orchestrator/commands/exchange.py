@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from fmus.kinds import AUTO, FMI_VERSIONS
+from fmus.kinds import AUTO, NATIVE
 from orchestrator.commands.options import (
     add_fmi,
     add_kind,
@@ -21,11 +21,12 @@ from orchestrator.commands.options import (
     read_system,
 )
 from orchestrator.commands.streams import FAILED, OK, describe, say, show
-from orchestrator.cosim import Exchange, Experiment, write_osp, write_ssp
+from orchestrator.cosim import Exchange, Experiment, System, write_osp, write_ssp
 from orchestrator.exchange.carried import Carried
 from orchestrator.exchange.hosts import BOUND, HOSTS, compare, fmi_of
 from orchestrator.exchange.release import write_release
 from orchestrator.exchange.verify import TOLERANCE, verify
+from orchestrator.machine.compilers import Platform, platforms
 from orchestrator.machine.errors import InputError, listed
 from orchestrator.program.files import ProgramFiles, write_files
 from orchestrator.program.fmu import SystemModel, write_fmu
@@ -40,13 +41,13 @@ from orchestrator.runs.preparation import (
     prepare,
 )
 from orchestrator.runs.request import Files, Request
-from orchestrator.runs.scenario import read_events, read_scenario
+from orchestrator.runs.scenario import Scenario, read_events, read_scenario
 
 #: Formats of an export.
 EXPORT_FORMATS = SSP, OSP, FMU, C = "ssp", "osp", "fmu", "c"
 
 #: Options of `export` that apply to one format only.
-_OF_FORMAT = {"flat": SSP, "connectors": SSP, "platforms": FMU, "single": C}
+_OF_FORMAT = {"flat": SSP, "connectors": SSP, "single": C}
 
 #: Tools that do not set parameters of a type, by the type.
 _LEAVING = {"Enumeration": "libcosim and ecos", "String": "OMSimulator and others"}
@@ -91,7 +92,7 @@ def add_export(parser: argparse.ArgumentParser) -> None:
     add_options(parser, Request, "step", "strict")
     add_kind(parser)
     add_fmi(parser, f"--format {FMU}")
-    add_platforms(parser, f"--format {FMU}")
+    add_platforms(parser, f"--kind {NATIVE} or --format {FMU}")
     add_set(parser)
     add_out(parser, "exports/SCENARIO/")
     add_options(parser, Files, "force")
@@ -202,13 +203,7 @@ def _add_scenario(parser: argparse.ArgumentParser) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    for name, format_name in _OF_FORMAT.items():
-        if getattr(options, name) and options.format != format_name:
-            raise InputError(f"--{name} applies only to --format {format_name}: leave it out")
-    # One program is made from the sources of the components, whatever kind their FMUs are.
-    is_one = options.format in (FMU, C)
-    chosen = (AUTO, FMI_VERSIONS[0]) if is_one else (options.kind, options.fmi)
-    scenario, system = read_system(options, *chosen)
+    scenario, system = _exported(options)
     ends = scenario.stop_time is not None or system.stop_time is not None
     request = Request(
         # A system without a stop time is written without one.
@@ -249,6 +244,42 @@ def _export(options: argparse.Namespace) -> int:
     for path in written:
         show(folder / path.relative_to(staging))
     return OK
+
+
+def _exported(options: argparse.Namespace) -> tuple[Scenario, System]:
+    """Read the scenario and system to export.
+
+    Raises:
+        InputError: options contradict each other, or an FMU lacks a platform.
+
+    """
+    for name, format_name in _OF_FORMAT.items():
+        if getattr(options, name) and options.format != format_name:
+            raise InputError(f"--{name} applies only to --format {format_name}: leave it out")
+    if options.platforms and options.format == C:
+        raise InputError(f"--platforms does not apply to --format {C}, which compiles nothing")
+    if options.format in (FMU, C):
+        # It is made from the sources of the components, whatever kind their FMUs are.
+        return read_system(options, AUTO)
+    if options.platforms and options.kind != NATIVE:
+        raise InputError(f"--platforms needs --kind {NATIVE} or --format {FMU}")
+    scenario, system = read_system(options, options.kind, options.fmi, options.platforms)
+    if options.platforms:
+        _check_platforms(system, platforms(options.fmi, options.platforms))
+    return scenario, system
+
+
+def _check_platforms(system: System, wanted: Sequence[Platform]) -> None:
+    """Raise an InputError if an FMU, which is the user's, lacks a library for a platform."""
+    for component in system.components.values():
+        # It may be of another version of FMI, with other names.
+        known = platforms(str(component.description.fmiMajorVersion), "all")
+        binaries = component.folder / "binaries"
+        there = {one for each in known if (binaries / each.name).is_dir() for one in each.machines}
+        if lacking := [each.name for each in wanted if not there.issuperset(each.machines)]:
+            raise InputError(
+                f"{component.fmu}: has no library for {listed(lacking)}; build it with --platforms"
+            )
 
 
 def _release(options: argparse.Namespace) -> int:

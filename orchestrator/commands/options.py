@@ -107,12 +107,17 @@ def add_out(parser: argparse.ArgumentParser, default: Path | str) -> None:
 
 
 def read_system(
-    options: argparse.Namespace, kind: str | None = None, fmi: str = FMI_VERSIONS[0]
+    options: argparse.Namespace,
+    kind: str | None = None,
+    fmi: str = FMI_VERSIONS[0],
+    platforms: str | None = None,
 ) -> tuple[Scenario, System]:
     """Read the scenario and system to run; harmless flaws become warnings."""
     findings = Findings(options.strict)
     kind = options.kind if kind is None else kind
-    scenario, system = load_scenario(options.scenario, kind, fmi, options.variant, findings)
+    scenario, system = load_scenario(
+        options.scenario, kind, fmi, options.variant, findings, platforms
+    )
     findings.refuse()
     for note in findings.notes:
         say(f"warning: {note}")

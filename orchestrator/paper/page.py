@@ -7,7 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
-from itertools import chain, groupby, pairwise
+from itertools import chain, count, groupby, pairwise
 from operator import itemgetter
 from pathlib import Path
 from string import Template
@@ -16,6 +16,7 @@ from urllib.parse import unquote
 
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
+from PIL import Image
 
 from auv_fmu.language.quantities import TAU
 from orchestrator.figures.style import printed_unit
@@ -27,6 +28,12 @@ _MARKDOWN = MarkdownIt("commonmark", {"html": False}).enable("table")
 
 #: Folders of the pages: of an installed package, or of the repository.
 _FOLDERS = Path(__file__).with_name("pages"), Path(__file__).parents[2] / "docs" / "explanation"
+
+#: Type and tag of the token that opens a chapter.
+_CHAPTER = ("heading_open", "h2")
+
+#: Heading of the column of verdicts.
+VERDICT = "verdict"
 
 #: Anchors in the report for links to its pages; other links become text.
 _ANCHORS = {"paper.md": "#what-is-wrong-in-the-paper", "readings.md": "#readings"}
@@ -113,12 +120,42 @@ def contents(text: str) -> str:
 
 
 def html(text: str, folder: Path) -> str:
-    """Return a text in Markdown as an HTML page with the pictures of a folder embedded."""
+    """Return a text in Markdown as an HTML page with the pictures of a folder embedded.
+
+    Links to the headings are folded, above the first heading of level 2.
+    """
     tokens = _MARKDOWN.parse(text)
     [title, *_] = _headings(tokens)
     _embed_pictures(tokens, folder)
-    body = typeset(_MARKDOWN.renderer.render(tokens, _MARKDOWN.options, {}))
-    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(title=title.title, body=body)
+    _label_cells(tokens)
+    chapters = (i for i, token in enumerate(tokens) if (token.type, token.tag) == _CHAPTER)
+    first = next(chapters, len(tokens))
+    start, body = (
+        typeset(_MARKDOWN.renderer.render(part, _MARKDOWN.options, {}))
+        for part in (tokens[:first], tokens[first:])
+    )
+    links = typeset(_MARKDOWN.render(contents(text)))
+    return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
+        title=title.title, start=start, contents=links, body=body
+    )
+
+
+def _label_cells(tokens: Sequence[Token]) -> None:
+    """Give each cell the heading of its column, for narrow screens, and a verdict its colour."""
+    header: list[str] = []
+    column = count()
+    for token, inline in pairwise(tokens):
+        if token.type == "thead_open":
+            header = []
+        elif token.type == "tr_open":
+            column = count()
+        elif token.type == "th_open":
+            header.append("".join(part.content for part in inline.children or ()))
+        elif token.type == "td_open":
+            name = header[next(column)]
+            token.attrSet("data-label", name)
+            if name == VERDICT and (kind := re.match(r"agrees|\*\*", inline.content)):
+                token.attrSet("class", "agrees" if kind[0] == "agrees" else "differs")
 
 
 def _embed_pictures(tokens: Sequence[Token], folder: Path) -> None:
@@ -128,7 +165,10 @@ def _embed_pictures(tokens: Sequence[Token], folder: Path) -> None:
             file = (folder / unquote(str(part.attrGet("src")))).resolve()
             if file.is_relative_to(folder.resolve()) and file.is_file():
                 content = base64.b64encode(file.read_bytes()).decode()
-                part.attrs |= {"loading": "lazy", "src": f"data:image/png;base64,{content}"}
+                with Image.open(file) as opened:
+                    # Links to headings below lead there before the picture is drawn.
+                    size = {"width": opened.width, "height": opened.height}
+                part.attrs |= {"loading": "lazy", "src": f"data:image/png;base64,{content}", **size}
             else:
                 part.type = "text"
 
@@ -146,9 +186,9 @@ def errata() -> str:
 
 
 def readings() -> str:
-    """Return the readings in Markdown, each with a heading of level 4."""
+    """Return the readings in Markdown, each with a heading of level 3."""
     _, first, text = _page_of_docs("readings.md").partition("\n## ")
-    return _deeper(first + text, 2)
+    return _deeper(first + text, 1)
 
 
 def linked(text: str) -> str:

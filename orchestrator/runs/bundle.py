@@ -150,13 +150,16 @@ def run_fmus(
 
 
 @cache
-def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
+def current_fmus(
+    kind: str = AUTO, fmi: str = FMI_VERSIONS[0], platforms: str | None = None
+) -> Path:
     """Return the folder with the FMUs of the installed sources; they are built if they are missing.
 
     Args:
         kind: one of :data:`fmus.kinds.KINDS`, or `auto`: native if they exist or can be built, else
             Python.
         fmi: version, one of :data:`fmus.kinds.FMI_VERSIONS`.
+        platforms: of the native kind, with commas between them; None: this machine.
 
     Raises:
         InputError: there is no such kind, they cannot be built, or the cache folder cannot be
@@ -167,7 +170,8 @@ def current_fmus(kind: str = AUTO, fmi: str = FMI_VERSIONS[0]) -> Path:
         return _best_fmus(fmi)
     if kind not in KINDS:
         raise InputError(f"kind {kind!r}: use one of {', '.join((AUTO, *KINDS))}")
-    files = kept_fmus(key_of(kind, fmi), partial(_built, "--kind", kind, "--fmi", fmi))
+    words = words_of(Form(kind=kind, fmi=fmi, platforms=platforms))
+    files = kept_fmus(key_of(kind, fmi, platforms), partial(_built, *words))
     return next(iter(files.values())).parent
 
 
@@ -207,9 +211,10 @@ def _best_fmus(fmi: str) -> Path:
         return folder
 
 
-def key_of(kind: str, fmi: str) -> str:
+def key_of(kind: str, fmi: str, platforms: str | None = None) -> str:
     """Cache key of the FMUs of the installed sources."""
-    return sha256(f"{kind} {fmi} {fingerprint(kind)}".encode()).hexdigest()[:16]
+    form = f"{kind} {fmi} {fingerprint(kind)}" + (f" {platforms}" if platforms else "")
+    return sha256(form.encode()).hexdigest()[:16]
 
 
 def _built(*options: str) -> dict[str, bytes]:

@@ -135,6 +135,7 @@ def load_scenario(
     fmi: str = FMI_VERSIONS[0],
     variant: str | None = None,
     findings: Findings | None = None,
+    platforms: str | None = None,
 ) -> tuple[Scenario, System]:
     """Load a scenario, with a value for each port, and its system.
 
@@ -142,6 +143,7 @@ def load_scenario(
         name, kind, fmi, variant: as in :func:`load`.
         findings: takes flaws; None: harmless flaws are ignored, and an FMU that is older than its
             script gives a warning.
+        platforms: of the bundle's FMUs, with commas between them; None: this machine.
 
     Raises:
         InputError: there is no such scenario, or its system cannot be put together.
@@ -155,11 +157,11 @@ def load_scenario(
     if path is None or read is None:
         scenario = scenario_of(name) if isinstance(name, Mapping) else read_scenario(str(name))
         check_figure(scenario.figure)
-        folder = current_fmus(kind, fmi)
-        system = closed_loop(folder, with_planners(scenario, folder, kind))
+        folder = current_fmus(kind, fmi, platforms)
+        system = closed_loop(folder, with_planners(scenario, folder, kind, platforms))
         scenario = replace(scenario, parameters=system.expanded(scenario.parameters))
     else:
-        check_brings_its_own(str(name), kind, fmi)
+        check_brings_its_own(str(name), kind, fmi, platforms)
         system = read_ssp(path, variant, findings) if read is read_ssp else read(path, findings)
         named = path.resolve().parent if path.name in _STRUCTURES else path.resolve()
         scenario = Scenario(named.stem, title=path.name or named.name)
@@ -241,10 +243,14 @@ def brings_its_own(name: str) -> bool:
     return _reader(Path(name)) is not None
 
 
-def check_brings_its_own(name: str, kind: str, fmi: str = FMI_VERSIONS[0]) -> None:
-    """Raise an InputError if a kind of FMU is requested of a system with its own FMUs."""
-    if kind == NATIVE or fmi != FMI_VERSIONS[0]:
-        raise InputError(f"{name}: contains its own FMUs; kind and fmi apply only to the bundle's")
+def check_brings_its_own(
+    name: str, kind: str, fmi: str = FMI_VERSIONS[0], platforms: str | None = None
+) -> None:
+    """Raise an InputError if a form of FMU is requested of a system with its own FMUs."""
+    if kind == NATIVE or fmi != FMI_VERSIONS[0] or platforms:
+        raise InputError(
+            f"{name}: contains its own FMUs; kind, fmi and platforms apply only to the bundle's"
+        )
 
 
 def left_behind(scenario: Scenario) -> str | None:

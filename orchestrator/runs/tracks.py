@@ -21,7 +21,7 @@ from orchestrator.machine.compilers import compiler_for, platforms
 from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, escape_unprintable
 from orchestrator.machine.texts import finite, in_docstring
-from orchestrator.runs.bundle import kept_fmus, run_fmus, settings_of
+from orchestrator.runs.bundle import Form, kept_fmus, run_fmus, settings_of, words_of
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import places_of_time, records, time_of
 from orchestrator.vehicle.signals import AXES
@@ -32,7 +32,9 @@ _FEWEST, _MOST = 4, 20_000
 _TEMPLATE = Path(__file__).with_name("templates") / "component" / "track.py.txt"
 
 
-def with_planners(scenario: Scenario, folder: Path, kind: str) -> Scenario:
+def with_planners(
+    scenario: Scenario, folder: Path, kind: str, targets: str | None = None
+) -> Scenario:
     """Replace the tables among the components of a scenario by FMUs of planners that follow them.
 
     Args:
@@ -40,6 +42,7 @@ def with_planners(scenario: Scenario, folder: Path, kind: str) -> Scenario:
         folder: of the bundle's FMUs; those of the planners have the same kind.
         kind: that was asked for; with `auto`, planners are of the Python kind where there is no
             compiler.
+        targets: the platforms of the planners, with commas between them; None: this machine.
 
     Raises:
         InputError: a table cannot be read, or is not a track.
@@ -59,27 +62,29 @@ def with_planners(scenario: Scenario, folder: Path, kind: str) -> Scenario:
             compiler_for(platforms(fmi))
         except (OSError, ValueError):
             made = PYTHON
-    planners = {component: str(_planner(table, made, fmi)) for component, table in tables.items()}
+    words = tuple(words_of(Form(kind=made, fmi=fmi, platforms=targets)))
+    planners = {component: str(_planner(table, made, words)) for component, table in tables.items()}
     return replace(scenario, components={**scenario.components, **planners})
 
 
-def _planner(table: Path, kind: str, fmi: str) -> Path:
+def _planner(table: Path, kind: str, words: Sequence[str]) -> Path:
     """Return the FMU of a planner that follows a table."""
     word = re.sub(r"\W+", "_", table.stem.lower(), flags=re.ASCII).strip("_")
     module = f"{word}_planner" if word[:1].isalpha() else f"track_{word}_planner"
-    return _built(module, planner_text(name_of(module), read_track(table), table.name), kind, fmi)
+    text = planner_text(name_of(module), read_track(table), table.name)
+    return _built(module, text, kind, words)
 
 
 @lru_cache(64)
-def _built(module: str, text: str, kind: str, fmi: str) -> Path:
+def _built(module: str, text: str, kind: str, words: Sequence[str]) -> Path:
     """Return the FMU of a planner, which is built once from the text of its module."""
-    key = sha256(f"{kind} {fmi} {fingerprint(kind)} {module} {text}".encode()).hexdigest()[:16]
+    key = sha256(f"{words} {fingerprint(kind)} {module} {text}".encode()).hexdigest()[:16]
 
     def build() -> dict[str, bytes]:
         with temporary_folder() as folder:
             script = folder / f"{module}.py"
             script.write_text(text, encoding="utf-8")
-            run_fmus("build", folder, str(script), "--kind", kind, "--fmi", fmi)
+            run_fmus("build", folder, str(script), *words)
             return {path.name: path.read_bytes() for path in (script, *folder.glob("*.fmu"))}
 
     return kept_fmus(key, build)[f"{name_of(module)}.fmu"]

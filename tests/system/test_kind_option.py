@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import zipfile
+from io import BytesIO
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,7 +16,9 @@ from fmpy.validation import validate_fmu
 from fmus.kinds import KINDS
 from orchestrator import load, simulate
 from orchestrator.commands.main import main
+from orchestrator.runs import bundle
 from support.settings import NAMES
+from support.texts import mentions
 
 SECOND = ["--stop-time", "1"]
 
@@ -86,6 +89,48 @@ def test_export_with_fmi_3_is_an_ssp_2(workplace: Path):
     assert not {"Real", "Integer", "String"} & types
     assert values.find(".//{*}Integer").get("value") == "1"
     assert validate_fmu("resources/AuvPlant.fmu") == []
+
+
+@pytest.fixture
+def any_platform(
+    native: Path, monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """A build of FMUs that compiles nothing: each platform asked for has an empty library."""
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+
+    def built(*options: str) -> dict[str, bytes]:
+        asked = options[options.index("--platforms") + 1].split(",")
+        files = {path.name: BytesIO(path.read_bytes()) for path in native.glob("*.fmu")}
+        for name, file in files.items():
+            with zipfile.ZipFile(file, "a") as archive:
+                for platform in asked:
+                    archive.writestr(f"binaries/{platform}/{Path(name).stem}.lib", b"")
+        return {name: file.getvalue() for name, file in files.items()}
+
+    monkeypatch.setattr(bundle, "_built", built)
+    bundle.current_fmus.cache_clear()
+
+
+@pytest.mark.usefixtures("any_platform")
+@pytest.mark.parametrize("format_name", ["ssp", "osp"])
+def test_exported_fmus_are_for_the_platforms_asked_for(workplace: Path, format_name: str):
+    options = ["--kind", "native", "--platforms", "win64,darwin64", "--format", format_name]
+    assert main(["export", "fig4", *options, "--out", "out"]) == 0
+    if format_name == "ssp":
+        zipfile.ZipFile("out/fig4.ssp").extractall("out")
+    fmus = [*Path("out").rglob("*.fmu")]
+    assert len(fmus) == 4
+    for fmu in fmus:
+        names = {Path(name).parts[1] for name in zipfile.ZipFile(fmu).namelist() if "binar" in name}
+        assert {"win64", "darwin64"} < names
+
+
+@pytest.mark.usefixtures("any_platform")
+def test_an_fmu_of_the_user_without_a_platform_is_refused(dist: Path, workplace: Path, refused):
+    shutil.copy(dist / "ObserverController.fmu", "own.fmu")
+    Path("own.toml").write_text(OWN)
+    options = ["--kind", "native", "--platforms", "linux64,aarch64-darwin"]
+    assert mentions(refused("export", "own.toml", *options), "own.fmu aarch64-darwin --platforms")
 
 
 def test_ssp_2_runs_as_ssp_1_does_bit_for_bit(workplace: Path):

@@ -312,7 +312,8 @@ def test_a_system_that_cannot_be_one_fmu_is_refused_by_name(workplace: Path, ref
     assert main(["new", "controller", "other_law", "--python"]) == 0
     for arguments, words in (
         ("other_law/other_law.toml --format fmu", "controller language"),
-        ("fig4 --platforms all", "--platforms --format fmu"),
+        ("fig4 --platforms all", "--platforms --kind native --format fmu"),
+        ("fig4 --platforms all --format c", "--platforms --format c"),
         ("fig4 --format fmu --flat", "--flat --format ssp"),
         ("fig4 --format fmu --platforms amiga", "amiga linux64"),
     ):

@@ -8,6 +8,7 @@ import shutil
 from pathlib import Path
 
 import pytest
+from PIL import Image
 
 from orchestrator.paper.claims import CLAIMS
 from orchestrator.paper.effects import EFFECTS
@@ -78,6 +79,16 @@ def test_the_verdicts_are_counted(text):
     agree = [verdict for verdict in verdicts if verdict.startswith("agrees")]
     found = len(verdicts), len(agree), sum(verdict.startswith("**") for verdict in verdicts)
     assert tuple(map(int, line)) == found
+    assert text.split("\n\n")[1].startswith("Of ")
+
+
+def test_pictures_are_small(folder, page):
+    files = [*(folder / "figures").rglob("*.png")]
+    assert files
+    for file in files:
+        with Image.open(file) as picture:
+            assert picture.mode == "P" and picture.width > 1000
+    assert len(page) < 8e6
 
 
 def test_the_stranger_is_in_the_report(folder, text, page):

@@ -5,6 +5,7 @@ import re
 
 import pytest
 from markdown_it import MarkdownIt
+from PIL import Image
 
 from orchestrator.paper.page import (
     actuator_values,
@@ -39,10 +40,32 @@ def test_contents_link_to_headings(tmp_path):
     assert set(re.findall(r'href="#([^"]+)"', page)) <= set(ids)
 
 
+def test_contents_are_folded_above_the_first_chapter(tmp_path):
+    page = html("# Top\n\nVerdict\n\n## First\n\n### Second\n\ntext", tmp_path)
+    start, rest = page.split("<details>")
+    folded, body = rest.split("</details>")
+    assert "<p>Verdict</p>" in start and 'id="first"' not in start
+    assert re.findall(r'href="#(.*)"', folded) == ["first", "second"]
+    assert 'id="first"' in body and "<p>text</p>" in body
+
+
+def test_cells_name_their_columns_and_verdicts_their_kind(tmp_path):
+    rows = [["a", "agrees, ratio 1"], ["b", "**differs**"], ["c", "none"]]
+    page = html("# T\n\n" + table(["claim `x`", "verdict"], rows), tmp_path)
+    assert re.findall(r'<td data-label="claim x"', page) == ['<td data-label="claim x"'] * 3
+    assert re.findall(r'data-label="verdict"(.*?)>', page) == [
+        ' class="agrees"',
+        ' class="differs"',
+        "",
+    ]
+
+
 def test_pictures_are_within_the_page_and_lead_to_their_files(tmp_path):
-    (tmp_path / "a.png").write_bytes(b"pixels")
+    file = tmp_path / "a.png"
+    Image.new("P", (3, 2)).save(file)
     page = html("# T\n\n" + picture("one", "a.png"), tmp_path)
-    assert f"data:image/png;base64,{base64.b64encode(b'pixels').decode()}" in page
+    assert f"data:image/png;base64,{base64.b64encode(file.read_bytes()).decode()}" in page
+    assert 'width="3" height="2"' in page
     assert '<a href="a.png">' in page
     assert 'src="a.png"' not in page
 
@@ -77,7 +100,7 @@ def test_escaped_texts_are_plain(text, tmp_path):
     )
     escaped = text.replace("<", "&lt;").replace(">", "&gt;")
     assert f">{escaped}</h2>" in page
-    assert f">{escaped}</td>" in page
+    assert f'<td data-label="c">{escaped}</td>' in page
 
 
 def test_html_in_markdown_is_text(tmp_path):
@@ -103,5 +126,5 @@ def test_other_mentions_are_not_changed():
 
 
 def test_readings_are_numbered():
-    numbers = re.findall(r"^#### Reading (\d+)$", readings(), re.MULTILINE)
+    numbers = re.findall(r"^### Reading (\d+)$", readings(), re.MULTILINE)
     assert numbers == [str(n) for n in range(1, 17)]

@@ -113,6 +113,6 @@ def test_parts_that_are_lost_with_a_scenario_are_named():
     assert left_behind(Scenario("s")) is None
     assert "events" in str(left_behind(Scenario("s", events=[{"at": 1.0}])))
     check_brings_its_own("mine.ssp", "python")
-    for kind, fmi in (("native", "2"), ("python", "3")):
+    for form in (("native", "2"), ("python", "3"), ("python", "2", "win64")):
         with pytest.raises(InputError, match=r"mine\.ssp"):
-            check_brings_its_own("mine.ssp", kind, fmi)
+            check_brings_its_own("mine.ssp", *form)
