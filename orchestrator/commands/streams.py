@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
 from typing import TextIO
 
 from orchestrator.machine.errors import escape_unprintable, shortened
@@ -37,11 +39,32 @@ def fill_streams() -> None:
 
 
 def say(text: str) -> None:
-    """Write a line for the user to standard error."""
-    with suppress(OSError):
+    """Write a line for the user to standard error, above progress bars."""
+    bars = sys.modules.get("tqdm")
+    with suppress(OSError), bars.tqdm.external_write_mode(sys.stderr) if bars else nullcontext():
         print(
             shortened(f"auv-fmu: {escape_unprintable(text)}", _LONGEST), file=sys.stderr, flush=True
         )
+
+
+class _Log(logging.Handler):
+    """Shows the lines of the program's log."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show one."""
+        say(record.getMessage())
+
+
+@contextmanager
+def shown_log() -> Iterator[None]:
+    """Show what the program logs within the context."""
+    log, handler = logging.getLogger("auv_fmu"), _Log()
+    log.setLevel(logging.INFO)
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
 
 
 def show(*lines: object) -> None:

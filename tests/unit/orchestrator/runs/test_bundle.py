@@ -75,7 +75,7 @@ def builds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Kinds that are built, with a compiler and an empty cache."""
     built = []
 
-    def run_fmus(module: str, folder: Path, *options: str) -> None:
+    def run_fmus(module: str, folder: Path, *options: str, **how: object) -> None:
         built.append(options[1])
         (folder / "build.json").write_text(json.dumps({"settings": {"kind": options[1]}}))
 
@@ -108,7 +108,7 @@ def test_auto_is_python_without_a_compiler(builds, monkeypatch):
 def test_auto_is_python_with_a_compiler_that_fails_and_says_so(builds, monkeypatch):
     build = bundle.run_fmus
 
-    def fails(module: str, folder: Path, *options: str) -> None:
+    def fails(module: str, folder: Path, *options: str, **how: object) -> None:
         if "native" in options:
             raise InputError("cc makes no AuvPlant")
         build(module, folder, *options)
