@@ -70,6 +70,8 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> None:
             # The other kind reports its libraries.
             _report(path.stem)
 
+    if stale:
+        _report(f"building {len(stale)} FMU{'s' * (len(stale) > 1)}")
     with ThreadPoolExecutor(kind.side_by_side) as pool:
         list(pool.map(write, stale))
     if stale:

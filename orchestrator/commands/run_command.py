@@ -160,7 +160,8 @@ def _print_outputs(name: str, run: WrittenRun) -> None:
     for output in known[:_MOST_OUTPUTS]:
         unit = rows.units.get(output, "")
         title = output if unit in ("", "1") else f"{output} [{printed_unit(unit)}]"
-        _print_line(title, [format_number(float(rows[output][i])) for i in (0, -1)])
+        # The sum is zero instead of minus zero.
+        _print_line(title, [format_number(float(rows[output][i]) + 0.0) for i in (0, -1)])
     more = len(known) - _MOST_OUTPUTS
     if more > 0:
         show(f"  and {more} more outputs")

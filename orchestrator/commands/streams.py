@@ -59,7 +59,8 @@ class _Log(logging.Handler):
 def shown_log() -> Iterator[None]:
     """Show what the program logs within the context."""
     log, handler = logging.getLogger("auv_fmu"), _Log()
-    log.setLevel(logging.INFO)
+    if log.level == logging.NOTSET:
+        log.setLevel(logging.INFO)
     log.addHandler(handler)
     try:
         yield

@@ -226,10 +226,19 @@ def key_of(kind: str, fmi: str) -> str:
 
 def _built(*options: str) -> dict[str, bytes]:
     """Build FMUs, and return the content of the files by name."""
-    LOG.info("building the FMUs (only once) ...")
+    heard: list[str] = []
     with (
         temporary_folder() as folder,
         progress_bar(total=len(components()), unit="FMU", disable=None, leave=False) as bar,
     ):
-        run_fmus("build", folder, *options, hear=lambda _: bar.update())
+
+        def hear(line: str) -> None:
+            """Say that FMUs will be made, then count them."""
+            if heard:
+                bar.update()
+            else:
+                LOG.info("%s (only once) ...", line)
+            heard.append(line)
+
+        run_fmus("build", folder, *options, hear=hear)
         return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}

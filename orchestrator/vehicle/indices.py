@@ -124,7 +124,7 @@ def _index(name: str, label: str, symbol: str = "", is_metric: bool = False) -> 
 
 
 #: The index of the verdict that is not in metrics.json.
-_SETTLING = _index("settling_time", "settling time")
+_SETTLING = _index("time_to_settle", "time to settle")
 
 #: All indices, in the order of the columns of a study; e is y - y_d with the true control point,
 #: efforts are of the applied signal. A run lacks an index if its system has no ports for it, or if

@@ -44,7 +44,7 @@ def _tracking(vehicles: Sequence[Found]) -> list[str]:
         return []
     far = max(hypot(*found["final_error"]) for found in vehicles)
     # A vehicle that is not near its reference at the end has no settling time.
-    times = [found.get("settling_time", (nan,))[0] for found in vehicles]
+    times = [found.get("time_to_settle", (nan,))[0] for found in vehicles]
     many = len(vehicles) > 1
     target = "their references" if many else "the reference"
     if any(map(isnan, times)):

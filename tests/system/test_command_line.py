@@ -55,7 +55,7 @@ def quick_builds(dist, monkeypatch):
 
 
 @pytest.mark.usefixtures("quick_builds")
-def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace, monkeypatch, capsys):
+def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(workplace))
     bundle.current_fmus.cache_clear()
     try:
@@ -65,7 +65,6 @@ def test_run_replaces_a_cached_fmu_that_is_not_what_was_built(workplace, monkeyp
         bundle.current_fmus.cache_clear()
         assert main(["run", "fig4", "--stop-time", "0.1", "--no-figures"]) == 0
         assert (bundle.current_fmus() / "AuvPlant.fmu").read_bytes() == whole
-        assert "building the FMUs (only once)" in capsys.readouterr().err
         # The damaged file is not ours to overwrite.
         assert fmu.read_bytes() == whole[:1000]
     finally:
@@ -95,15 +94,15 @@ def test_run_writes_only_into_its_folder(workplace, capsys):
 def test_a_run_ends_with_a_verdict_and_its_figure(workplace, capsys):
     """The verdict is computed again from the table; without noise y is the true control point."""
     arguments = ["run", "FIG4", "--set", "plant.noise.std=0", "--stop-time"]
-    assert main([*arguments, "12"]) == 0
+    assert main([*arguments, "15"]) == 0
     heading, *_, verdict, place, figure = capsys.readouterr().out.splitlines()
-    assert heading == "fig4 --stop-time 12 --set plant.noise.std=0"
+    assert heading == "fig4 --stop-time 15 --set plant.noise.std=0"
     assert place == f"written to {Path('results', 'fig4')}{os.sep}"
     assert Path(figure.removeprefix("figure: ")).read_bytes().startswith(b"\x89PNG")
     table = read_csv("results/fig4/result.csv")
     e = np.column_stack([table[f"plant.y.{k}"] - table[f"planner.y_d.{k}"] for k in "xyz"])
     far = table["time"][np.linalg.norm(e, axis=1) > 1.0][-1]
-    last = np.linalg.norm(np.abs(e[table["time"] >= 7.0]).max(axis=0))
+    last = np.linalg.norm(np.abs(e[table["time"] >= 10.0]).max(axis=0))
     said = re.match(
         r"fig4: within 1 m of the reference from (.*) s on, within (.*) cm at the end", verdict
     )

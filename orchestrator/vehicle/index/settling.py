@@ -19,7 +19,7 @@ class State(NamedTuple):
 class Outputs(NamedTuple):
     """Time."""
 
-    settling_time: Annotated[
+    time_to_settle: Annotated[
         float,
         Variable(
             "s",

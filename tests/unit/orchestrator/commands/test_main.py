@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import shlex
 
 import pytest
 
 from orchestrator.commands.main import COMMANDS, parser
+from orchestrator.commands.streams import shown_log
 from orchestrator.runs import bundle
 
 
@@ -84,6 +86,14 @@ def test_what_is_not_a_command_or_a_number_is_named(capsys, words, message):
     with pytest.raises(SystemExit, match="2"):
         parser(words).parse_args(words)
     assert capsys.readouterr().err.endswith(f"error: {message}\n")
+
+
+def test_what_the_program_logs_is_shown_while_a_command_runs(capsys):
+    log = logging.getLogger("auv_fmu")
+    with shown_log():
+        log.warning("building")
+    log.warning("nothing")
+    assert capsys.readouterr().err == "auv-fmu: building\n"
 
 
 def no_compiler(_: object) -> None:

@@ -14,7 +14,7 @@ CALM = {"saturated_fraction": (0.0, 0.0, 0.0)}
 
 def tracking(x: float, settled: float | None = None, **more: tuple[float, ...]) -> dict:
     """Indices of a vehicle with an error along x only."""
-    times = {} if settled is None else {"settling_time": (settled,)}
+    times = {} if settled is None else {"time_to_settle": (settled,)}
     return {"final_error": (x, 0.0, 0.0), **times, **more}
 
 
