@@ -10,6 +10,7 @@ import sys
 import textwrap
 import warnings
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from importlib import import_module
 from itertools import pairwise
@@ -21,6 +22,7 @@ from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, OK, Ou
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError, StartError, did_you_mean, reason
 from orchestrator.machine.interrupts import orderly_end
+from orchestrator.machine.lazy import passing_line
 from orchestrator.runs import SCENARIOS_FOLDER, names_in
 
 #: The commands by subject: the module with `add_COMMAND`, and the purpose.
@@ -52,6 +54,9 @@ _GROUPS = {
 }
 COMMANDS = {name: what for group in _GROUPS.values() for name, what in group.items()}
 
+#: Commands that are quick, or show their progress themselves.
+_SHOWN = {"hosts", "list", "report", "run", "sweep"}
+
 #: Columns of the help.
 _NAMES, _WIDTH = 10, 78
 
@@ -79,7 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options = parser(given).parse_args(given)
             _check_no_empty(given)
             options.command = ["auv-fmu", *given]
-            status = int(options.action(options))
+            with _working(given):
+                status = int(options.action(options))
     except InputError as error:
         say(str(error))
         status = FAILED if isinstance(error, StartError) else BAD_INPUT
@@ -98,6 +104,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(reason(error))
         status = BAD_INPUT
     return status if streams.finished() else status or FAILED
+
+
+def _working(arguments: Sequence[str]) -> AbstractContextManager[object]:
+    """Show the command on a terminal while it works, unless it is quick or shows progress."""
+    if not sys.stderr.isatty() or arguments[0] in _SHOWN:
+        return nullcontext()
+    context: AbstractContextManager[object] = passing_line(f"auv-fmu {arguments[0]} ...")
+    return context
 
 
 def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *place: Any) -> None:

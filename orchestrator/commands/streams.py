@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from typing import TextIO
 
 from orchestrator.machine.errors import escape_unprintable, shortened
@@ -40,8 +40,7 @@ def fill_streams() -> None:
 
 def say(text: str) -> None:
     """Write a line for the user to standard error, above progress bars."""
-    bars = sys.modules.get("tqdm")
-    with suppress(OSError), bars.tqdm.external_write_mode(sys.stderr) if bars else nullcontext():
+    with suppress(OSError), _above_bars(sys.stderr):
         print(
             shortened(f"auv-fmu: {escape_unprintable(text)}", _LONGEST), file=sys.stderr, flush=True
         )
@@ -76,11 +75,21 @@ def show(*lines: object) -> None:
 
     """
     try:
-        for line in lines:
-            print(_encodable(sys.stdout, escape_unprintable(str(line))))
+        with _above_bars(sys.stdout):
+            for line in lines:
+                print(_encodable(sys.stdout, escape_unprintable(str(line))))
     except OSError as error:
         _give_up(sys.stdout, error)
         raise OutputLost from error
+
+
+def _above_bars(stream: TextIO) -> AbstractContextManager[object]:
+    """Move progress bars out of the way of a stream."""
+    bars = sys.modules.get("tqdm")
+    mode: AbstractContextManager[object] = (
+        bars.tqdm.external_write_mode(stream) if bars else nullcontext()
+    )
+    return mode
 
 
 def _encodable(stream: TextIO, text: str) -> str:
