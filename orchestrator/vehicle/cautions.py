@@ -198,9 +198,9 @@ def cautions_seen(
         h_p = min(step, h_max) * robust_rate(rho_hat, eps_t, lambda_m2)
         if h_p > _REVERSES:
             text = (
-                f"the robust term chatters: its step gain h p is {h_p:.3g}, and above "
-                f"{_REVERSES:g} its sign changes in every step (theta_hat[1] reaches {rho_hat:.3g} "
-                f"N, {eps} = {eps_t:g} W); raise eps_t or reduce --step"
+                f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {eps} "
+                f"= {eps_t:g} W its step gain h p is {h_p:.3g}, and above {_REVERSES:g} its sign "
+                "changes in every step; raise eps_t or reduce --step"
             )
             yield Caution(CHATTERING, text)
     if vertical < inf and value(roll) is False:
