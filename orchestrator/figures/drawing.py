@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from io import BytesIO
-from itertools import cycle, islice
+from itertools import cycle
 from math import lcm
 from pathlib import Path
 from typing import Any
@@ -64,7 +64,7 @@ _NO_DATE: dict[str, Any] = {
 #: above and below its panels [in].
 _HEADING, _ROW, _PANEL, _MARGIN = 0.3, 0.2, 1.9, 0.6
 
-#: Largest number of panels of a plot without patterns.
+#: Largest number of groups in a plot without patterns.
 _MOST_PANELS = 12
 
 #: Characters in a row of a heading, in a row of a legend, and as wide as the line of an entry.
@@ -332,11 +332,19 @@ def wanted_columns(
     return wanted or list(columns)
 
 
-def _changing(runs: Sequence[Drawn], names: Sequence[str]) -> list[str]:
-    """Return the columns that change in a run, or all if none does."""
+def _first_signals(runs: Sequence[Drawn], names: Sequence[str]) -> list[str]:
+    """Return the columns that change in a run, or all if none does: those of the first groups."""
     held = [(run.result, name) for run in runs for name in names if name in run.result]
     changing = {name for rows, name in held if rows[name].min() != rows[name].max()}
-    return [name for name in names if name in changing] or list(names)
+    shown = [name for name in names if name in changing] or list(names)
+    groups = list(dict.fromkeys(map(_group_of, shown)))
+    if len(groups) > _MOST_PANELS:
+        warnings.warn(
+            f"drawn are the first {_MOST_PANELS} of {len(groups)} groups of signals; `auv-fmu plot "
+            f"RESULT PATTERN` draws others, such as {groups[_MOST_PANELS]}",
+            stacklevel=3,
+        )
+    return [name for name in shown if _group_of(name) in groups[:_MOST_PANELS]]
 
 
 def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
@@ -355,24 +363,16 @@ def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
     if not all(isinstance(pattern, str) for pattern in patterns):
         raise InputError(f"patterns are texts such as plant.y.*, not {list(patterns)!r}")
     names = list(dict.fromkeys(name for run in runs for name in run.result.header.numeric_columns))
-    are_chosen = bool(patterns)
     if not patterns:
         patterns = wanted_columns(names, [loop for run in runs for loop in run.loops], ())
         if patterns == names:
-            patterns = _changing(runs, names)
+            patterns = _first_signals(runs, names)
     units = {name: unit for run in runs for name, unit in run.result.header.units.items()}
     panels: dict[tuple[str, str], list[str]] = {}
     for name in matching(names, patterns):
         # The members of a vector share a panel, whatever their units.
         unit = "" if name.endswith("]") else printed_unit(units.get(name, ""))
         panels.setdefault((_group_of(name), unit), []).append(name)
-    if len(panels) > _MOST_PANELS and not are_chosen:
-        warnings.warn(
-            f"drawn are the first {_MOST_PANELS} of {len(panels)} groups of signals; `auv-fmu plot "
-            f"RESULT PATTERN` draws others, such as {[*panels][_MOST_PANELS][0]}",
-            stacklevel=2,
-        )
-        panels = dict(islice(panels.items(), _MOST_PANELS))
     with styled():
         figure = Plot(figsize=(FIGURE_WIDTH, _MARGIN + _PANEL * len(panels)))
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
