@@ -333,7 +333,7 @@ def wanted_columns(
 
 
 def _first_signals(runs: Sequence[Drawn], names: Sequence[str]) -> list[str]:
-    """Return the columns that change in a run, or all if none does: those of the first groups."""
+    """Return the columns that change in a run, or all columns, of the first groups."""
     held = [(run.result, name) for run in runs for name in names if name in run.result]
     changing = {name for rows, name in held if rows[name].min() != rows[name].max()}
     shown = [name for name in names if name in changing] or list(names)
