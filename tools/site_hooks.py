@@ -28,6 +28,7 @@ from nbclient import NotebookClient
 from fmus.discovery import components
 from orchestrator.live import presets
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.mathematics import typeset
 
 ROOT = Path(__file__).parents[1]
 
@@ -59,6 +60,7 @@ BOOSTS = {
 _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 _PRESET = re.compile(r"<!-- live: (([\w-]+)\S*) -->")
 _ROW, _CODE = re.compile(r"^\|.*$", re.MULTILINE), re.compile(r"`[^`]+`")
+_DISPLAYED = '<div class="math"'
 _ROLE = re.compile(r":(class|data|func|mod):(?=<code>)")
 
 log = logging.getLogger(f"mkdocs.hooks.{__name__}")
@@ -108,7 +110,8 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
 
 
 def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Remove the roles of names in docstrings."""
+    """Typeset mathematics, whose displays are not searched, and remove roles in docstrings."""
+    content = typeset(content).replace(_DISPLAYED, f"{_DISPLAYED} data-search-exclude")
     return _ROLE.sub("", content)
 
 
