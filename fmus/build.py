@@ -63,8 +63,17 @@ def build(destination: Path, kind: PythonKind | NativeKind) -> None:
         if not (path := destination / f"{component}.fmu").is_file()
         or digests.get(path.name) != sha256_of(path)
     }
+
+    def write(path: Path) -> None:
+        kind.write(stale[path], path)
+        if isinstance(kind, PythonKind):
+            # The other kind reports its libraries.
+            _report(path.stem)
+
+    if stale:
+        _report(f"building {len(stale)} FMU{'s' * (len(stale) > 1)}")
     with ThreadPoolExecutor(kind.side_by_side) as pool:
-        list(pool.map(lambda path: kind.write(stale[path], path), stale))
+        list(pool.map(write, stale))
     if stale:
         digests |= {path.name: sha256_of(path) for path in stale}
         text = json.dumps({**made_from, "sha256": digests})

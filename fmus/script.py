@@ -62,7 +62,7 @@ def is_component(path: Path) -> bool:
 
 def no_component(path: Path) -> str:
     """Return the message about a script that is not a component."""
-    return f"{path}: not a component, which has a function outputs() (see `auv-fmu new`)"
+    return f"{path}: not a component: it has no function outputs() (see `auv-fmu new`)"
 
 
 def _defined(node: ast.stmt) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import shutil
@@ -45,6 +46,9 @@ settings.register_profile("attack", settings.get_profile("search"), max_examples
 signal.signal(signal.SIGINT, signal.default_int_handler)
 if os.name == "posix":
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+# A command builds FMUs first, and says so, only if no earlier test has built them.
+logging.getLogger("auv_fmu").setLevel(logging.WARNING)
 
 #: Words of a reason around the name of the missing thing.
 _MISSING = re.compile(r"^(there is |there are )?no | (is|are) not installed$")

@@ -158,7 +158,9 @@ def _build(options: argparse.Namespace) -> int:
     if options.watch:
         raise InputError("--watch is for your own component: name its script")
     folder = options.out or DEFAULT_FOLDERS[options.kind]
-    written = bundle.build_bundle(folder, force=options.force, hear=say, **_form(options))
+    # FMUs of the other kind are made in a moment.
+    heard = {"hear": say} if options.kind == NATIVE else {}
+    written = bundle.build_bundle(folder, force=options.force, **heard, **_form(options))
     show(*written)
     state = "built" if written else "up to date"
     show(f"{folder} is {state}, {_described(bundle.settings_of(folder))}")

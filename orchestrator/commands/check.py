@@ -93,16 +93,14 @@ def _is_study(file: str) -> bool:
 def _study(options: argparse.Namespace, findings: Findings) -> list[str]:
     """Check a study as `sweep` does before its first run; returns remarks."""
     # Their import takes half a second.
-    from orchestrator.studies.study import SOBOL, read_study  # noqa: PLC0415
+    from orchestrator.studies.study import read_study  # noqa: PLC0415
     from orchestrator.studies.sweep import Means, check_installed, prepare_study  # noqa: PLC0415
 
     with findings.collecting():
         study = read_study(options.file)
         check_installed(("scipy",) * (study.sample is not None))
         prepare_study(study, Means())
-        sample = study.sample
-        if sample is not None and sample.method == SOBOL and sample.n & (sample.n - 1):
-            return [f"sample: {SOBOL} spreads its samples evenly only if n is a power of two"]
+        return [*filter(None, [study.sample and study.sample.remark])]
     return []
 
 

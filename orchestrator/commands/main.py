@@ -7,8 +7,10 @@ import logging
 import os
 import re
 import sys
+import textwrap
 import warnings
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from importlib import import_module
 from itertools import pairwise
@@ -20,26 +22,43 @@ from orchestrator.commands.streams import BAD_INPUT, FAILED, INTERRUPTED, OK, Ou
 from orchestrator.machine.children import imported_apart
 from orchestrator.machine.errors import InputError, StartError, did_you_mean, reason
 from orchestrator.machine.interrupts import orderly_end
+from orchestrator.machine.lazy import passing_line
+from orchestrator.runs import SCENARIOS_FOLDER, names_in
 
-#: The commands: the module with `add_COMMAND`, and the purpose.
-COMMANDS = {
-    "build": ("build", "build the bundle (every FMU, and auv.ssp), or your own component"),
-    "list": ("listing", "list the scenarios"),
-    "gains": ("build", "check the conditions of Theorems 1 and 2"),
-    "run": ("run_command", "run a scenario, a scenario file, an SSP or an FMU"),
-    "check": ("check", "validate an FMU, an SSP, a scenario, a study or a component of your own"),
-    "sweep": ("many_runs", "run a study"),
-    "plot": ("look", "plot signals of stored results"),
-    "view": ("look", "write a page that plays a stored result in 3D"),
-    "live": ("look", "write an interactive page: move sliders, watch the loop"),
-    "animate": ("look", "write a film of a scenario"),
-    "new": ("build", "create a component or a controller from a template"),
-    "report": ("many_runs", "run all scenarios and compare them with the paper"),
-    "export": ("exchange", "write a scenario for other tools"),
-    "release": ("exchange", "write the archives of a release"),
-    "hosts": ("exchange", "run a scenario in other co-simulation tools"),
-    "verify": ("exchange", "compare another tool's table, or an FMU's own results, with a run"),
-}  # fmt: skip
+#: The commands by subject: the module with `add_COMMAND`, and the purpose.
+_GROUPS = {
+    "run and look": {
+        "list": ("listing", "list the scenarios"),
+        "run": ("run_command", "run a scenario, an SSP or an FMU"),
+        "plot": ("look", "plot signals of stored results"),
+        "view": ("look", "write a page that plays a stored result in 3D"),
+        "live": ("look", "write an interactive page: move sliders, watch the loop"),
+        "animate": ("look", "write a film of a scenario"),
+        "sweep": ("many_runs", "run a study: many runs with varied parameters"),
+    },
+    "your own components": {
+        "new": ("build", "create a component or a controller from a template"),
+        "build": ("build", "build the FMU of your component, or all bundled FMUs"),
+        "check": ("check", "find mistakes in a component, scenario, study, FMU or SSP"),
+    },
+    "other tools": {
+        "export": ("exchange", "write a scenario for other tools"),
+        "hosts": ("exchange", "run a scenario in other co-simulation tools"),
+        "verify": ("exchange", "compare another tool's table, or an FMU's own, with a run"),
+        "release": ("exchange", "write the archives of a release"),
+    },
+    "the paper": {
+        "gains": ("build", "check the conditions of Theorems 1 and 2"),
+        "report": ("many_runs", "run all scenarios and compare them with the paper"),
+    },
+}
+COMMANDS = {name: what for group in _GROUPS.values() for name, what in group.items()}
+
+#: Commands that are quick, or show their progress themselves.
+_SHOWN = {"hosts", "list", "report", "run", "sweep"}
+
+#: Columns of the help.
+_NAMES, _WIDTH = 10, 78
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -57,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     streams.fill_streams()
     status = OK
     try:
-        with orderly_end(arguments is None), warnings.catch_warnings():
+        with orderly_end(arguments is None), warnings.catch_warnings(), streams.shown_log():
             warnings.showwarning = partial(_warn, warnings.showwarning)
             # A file in the current folder may belong to someone else.
             imported_apart("matplotlib", "matplotlibrc")
@@ -65,7 +84,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             options = parser(given).parse_args(given)
             _check_no_empty(given)
             options.command = ["auv-fmu", *given]
-            status = int(options.action(options))
+            with _working(given):
+                status = int(options.action(options))
     except InputError as error:
         say(str(error))
         status = FAILED if isinstance(error, StartError) else BAD_INPUT
@@ -84,6 +104,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         say(reason(error))
         status = BAD_INPUT
     return status if streams.finished() else status or FAILED
+
+
+def _working(arguments: Sequence[str]) -> AbstractContextManager[object]:
+    """Show the command on a terminal while it works, unless it is quick or shows progress."""
+    if not sys.stderr.isatty() or arguments[0] in _SHOWN:
+        return nullcontext()
+    context: AbstractContextManager[object] = passing_line(f"auv-fmu {arguments[0]} ...")
+    return context
 
 
 def _warn(otherwise: Any, message: Warning | str, category: type[Warning], *place: Any) -> None:
@@ -125,7 +153,22 @@ class Parser(argparse.ArgumentParser):
         if action.choices is not None and value not in action.choices:
             names = [*map(str, action.choices)]
             hint = did_you_mean(str(value), names) or f"; choose from {', '.join(names)}"
+            if value in names_in(SCENARIOS_FOLDER) and "run" in names:
+                hint = f"; did you mean auv-fmu run {value}?"
+            if isinstance(action, argparse._SubParsersAction):
+                raise argparse.ArgumentError(
+                    None, f"no {str(action.metavar).lower()} {value!r}{hint}"
+                )
             raise argparse.ArgumentError(action, f"invalid choice: {value!r}{hint}")
+
+    def _get_value(self, action: argparse.Action, text: str) -> Any:
+        try:
+            return super()._get_value(action, text)
+        except argparse.ArgumentError:
+            if action.type not in (float, int):
+                raise
+            what = "a number" if action.type is float else "a whole number"
+            raise argparse.ArgumentError(action, f"{text!r} is not {what}") from None
 
     def error(self, message: str) -> NoReturn:
         """Print the mistake, and end the process."""
@@ -147,19 +190,34 @@ def parser(given: Iterable[str] = COMMANDS) -> argparse.ArgumentParser:
             command takes up to a second.
 
     """
+    groups = (
+        "\n".join([f"{title}:", *(f"  {name:{_NAMES}}{text}" for name, (_, text) in group.items())])
+        for title, group in _GROUPS.items()
+    )
+    purpose = (
+        "Co-simulate an autonomous underwater vehicle with limited torque and without velocity "
+        "sensors, from FMI components."
+    )
+    ends = (
+        "`auv-fmu COMMAND --help` shows the options of a command and an example. Exit status: 0 on "
+        "success; 1 if a simulation failed (its rows are kept); 2 for bad usage or input; 130 "
+        "after Ctrl-C."
+    )
     parser = Parser(
         prog="auv-fmu",
-        description="Co-simulate an autonomous underwater vehicle with limited torque and "
-        "without velocity sensors, from FMI components.",
-        epilog="Exit status: 0 on success; 1 if a simulation failed (its rows are kept); 2 for bad "
-        "usage or input; 130 after Ctrl-C. `auv-fmu COMMAND --help` shows the options of a command "
-        "and an example.",
+        usage="auv-fmu [-h] [--version] COMMAND ...",
+        description="\n\n".join([textwrap.fill(purpose, _WIDTH), *groups]),
+        epilog=textwrap.fill(ends, _WIDTH),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=__version__)
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    # The groups above list them.
+    commands = parser.add_subparsers(
+        required=True, prog="auv-fmu", metavar="COMMAND", help=argparse.SUPPRESS
+    )
     named = set(given)
-    for name, (module, text) in COMMANDS.items():
-        command = commands.add_parser(name, help=text)
+    for name, (module, _) in COMMANDS.items():
+        command = commands.add_parser(name)
         if name in named:
             getattr(import_module(f"orchestrator.commands.{module}"), f"add_{name}")(command)
     return parser

@@ -7,10 +7,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
-from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE, PYTHON
+from fmus.kinds import AUTO, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.commands.streams import FAILED, OK, say
 from orchestrator.cosim import Ending, System
 from orchestrator.machine.errors import Findings, InputError
+from orchestrator.runs.bundle import best_kind
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.request import Request, flags
 from orchestrator.runs.scenario import Scenario
@@ -81,11 +82,17 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
     """Add the kind of FMUs for other tools; the default does not depend on a compiler here."""
     parser.add_argument(
         "--kind",
-        choices=KINDS,
+        type=_kind,
+        choices=(AUTO, *KINDS),
         default=PYTHON,
-        help=f"kind of FMU: {PYTHON} (source code) or {NATIVE} (its translation to C, compiled); "
-        f"both give the same numbers; default: {PYTHON}",
+        help=f"kind of FMU: {PYTHON} (source code) or {NATIVE} (its translation to C, compiled), "
+        f"with the same numbers, or {AUTO} ({NATIVE} if there is a C compiler); default: {PYTHON}",
     )
+
+
+def _kind(text: str) -> str:
+    """Return the kind that a user has named; for `auto`, the one that can be built here."""
+    return best_kind() if text == AUTO else text
 
 
 def add_set(parser: argparse.ArgumentParser) -> None:

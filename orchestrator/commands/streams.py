@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import os
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from typing import TextIO
 
 from orchestrator.machine.errors import escape_unprintable, shortened
@@ -37,11 +39,32 @@ def fill_streams() -> None:
 
 
 def say(text: str) -> None:
-    """Write a line for the user to standard error."""
-    with suppress(OSError):
+    """Write a line for the user to standard error, above progress bars."""
+    with suppress(OSError), _above_bars(sys.stderr):
         print(
             shortened(f"auv-fmu: {escape_unprintable(text)}", _LONGEST), file=sys.stderr, flush=True
         )
+
+
+class _Log(logging.Handler):
+    """Shows the lines of the program's log."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Show one."""
+        say(record.getMessage())
+
+
+@contextmanager
+def shown_log() -> Iterator[None]:
+    """Show what the program logs within the context."""
+    log, handler = logging.getLogger("auv_fmu"), _Log()
+    if log.level == logging.NOTSET:
+        log.setLevel(logging.INFO)
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
 
 
 def show(*lines: object) -> None:
@@ -52,11 +75,21 @@ def show(*lines: object) -> None:
 
     """
     try:
-        for line in lines:
-            print(_encodable(sys.stdout, escape_unprintable(str(line))))
+        with _above_bars(sys.stdout):
+            for line in lines:
+                print(_encodable(sys.stdout, escape_unprintable(str(line))))
     except OSError as error:
         _give_up(sys.stdout, error)
         raise OutputLost from error
+
+
+def _above_bars(stream: TextIO) -> AbstractContextManager[object]:
+    """Move progress bars out of the way of a stream."""
+    bars = sys.modules.get("tqdm")
+    mode: AbstractContextManager[object] = (
+        bars.tqdm.external_write_mode(stream) if bars else nullcontext()
+    )
+    return mode
 
 
 def _encodable(stream: TextIO, text: str) -> str:

@@ -368,6 +368,6 @@ class RealTime:
             f"{1e3 * seconds:.3g} ms" for seconds in (late.mean, late.percentile, late.worst)
         )
         return (
-            f"real time x {self.factor:g}: late by {mean} on average, {percentile} at the 99th "
+            f"real time x {self.factor:g}: steps {mean} late on average, {percentile} at the 99th "
             f"percentile, {worst} at worst"
         )

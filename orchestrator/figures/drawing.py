@@ -64,11 +64,11 @@ _NO_DATE: dict[str, Any] = {
 #: above and below its panels [in].
 _HEADING, _ROW, _PANEL, _MARGIN = 0.3, 0.2, 1.9, 0.6
 
+#: Largest number of groups in a plot without patterns.
+_MOST_PANELS = 12
+
 #: Characters in a row of a heading, in a row of a legend, and as wide as the line of an entry.
 _HEADING_LETTERS, _LETTERS, _LINE = 74, 100, 6
-
-#: Seconds before a progress bar appears.
-_PATIENCE = 2.0
 
 #: Largest number of parameters, or of events, in the labels of runs.
 _FEW = 2
@@ -255,7 +255,8 @@ def draw(
     """Draw the figures of a scenario as PNG and SVG, with the panels for which there are signals.
 
     Several vehicles have one figure together. Each of up to :data:`.MOST_DRAWN` also has its own,
-    with the vehicle of the same name in the other runs.
+    with the vehicle of the same name in the other runs. Without a vehicle, there is one figure of
+    all signals.
 
     Args:
         kind: key of :data:`FIGURES`.
@@ -271,6 +272,12 @@ def draw(
     """
     notes: list[str] = []
     loops = runs[0].loops
+    if not loops:
+        try:
+            save(plot(runs), *(folder / f"{stem}.{ending}" for ending in FIGURE_FORMATS))
+        except InputError as error:
+            return [f"no figure: {error}"]
+        return []
     for key, vehicle, drawn in figures_of(kind, loops):
         shown, text = list(runs), title
         if len(drawn) < len(loops):
@@ -278,7 +285,7 @@ def draw(
             shown = _with_vehicle(runs, loop)
             text = f"{title}, {loop.name}" if title and loop.name else title
         files = FIGURES[key].items()
-        for suffix, rows in tqdm(files, "drawing", delay=_PATIENCE, disable=None, leave=False):
+        for suffix, rows in tqdm(files, "drawing", disable=None, leave=False):
             if stop():
                 break
             name = f"{stem}{vehicle}{suffix}"
@@ -307,7 +314,11 @@ def draw(
 def wanted_columns(
     columns: Sequence[str], loops: Sequence[Loop], patterns: Sequence[str]
 ) -> list[str]:
-    """Return the columns that match some patterns, or without any, the usual ones of each loop."""
+    """Return the columns that match some patterns; without any, the usual ones of each loop.
+
+    A run without these has no usual ones, and all count.
+
+    """
     patterns = patterns or [
         group
         for loop in loops
@@ -317,7 +328,23 @@ def wanted_columns(
             f"{loop.controller}.theta_hat",
         )
     ]
-    return [name for name in columns if any(matches(name, pattern) for pattern in patterns)]
+    wanted = [name for name in columns if any(matches(name, pattern) for pattern in patterns)]
+    return wanted or list(columns)
+
+
+def _first_signals(runs: Sequence[Drawn], names: Sequence[str]) -> list[str]:
+    """Return the columns that change in a run, or all columns, of the first groups."""
+    held = [(run.result, name) for run in runs for name in names if name in run.result]
+    changing = {name for rows, name in held if rows[name].min() != rows[name].max()}
+    shown = [name for name in names if name in changing] or list(names)
+    groups = list(dict.fromkeys(map(_group_of, shown)))
+    if len(groups) > _MOST_PANELS:
+        warnings.warn(
+            f"drawn are the first {_MOST_PANELS} of {len(groups)} groups of signals; `auv-fmu plot "
+            f"RESULT PATTERN` draws others, such as {groups[_MOST_PANELS]}",
+            stacklevel=3,
+        )
+    return [name for name in shown if _group_of(name) in groups[:_MOST_PANELS]]
 
 
 def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
@@ -326,7 +353,8 @@ def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
     Args:
         runs: with labels that differ.
         patterns: such as `plant.y.*`, or the name of a group or column; none: errors, commands
-            and estimates of the loops of all vehicles.
+            and estimates of the loops of all vehicles, or of other systems all that changes, in
+            the first panels.
 
     Raises:
         InputError: a pattern matches no column.
@@ -337,9 +365,8 @@ def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
     names = list(dict.fromkeys(name for run in runs for name in run.result.header.numeric_columns))
     if not patterns:
         patterns = wanted_columns(names, [loop for run in runs for loop in run.loops], ())
-    if not patterns:
-        groups = dict.fromkeys(map(_group_of, names))
-        raise InputError(f"name the columns to draw; there are {', '.join(groups)}")
+        if patterns == names:
+            patterns = _first_signals(runs, names)
     units = {name: unit for run in runs for name, unit in run.result.header.units.items()}
     panels: dict[tuple[str, str], list[str]] = {}
     for name in matching(names, patterns):

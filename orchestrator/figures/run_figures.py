@@ -693,9 +693,11 @@ def figure_files(key: str, stem: str, loops: Sequence[Loop] = (STANDARD,)) -> li
     Args:
         key: of :data:`FIGURES`.
         stem: of the file names.
-        loops: of the vehicles.
+        loops: of the vehicles; without any, there is one figure of all signals.
 
     """
+    if not loops:
+        return [f"{stem}.{ending}" for ending in FIGURE_FORMATS]
     return [
         f"{stem}{vehicle}{suffix}.{ending}"
         for figure, vehicle, _ in figures_of(key, loops)

@@ -43,6 +43,11 @@ def progress_bar(**options: Any) -> Any:
     return import_module("tqdm.notebook" if is_widget else "tqdm").tqdm(**options)
 
 
+def passing_line(text: str) -> Any:
+    """Return a context that shows a line on a terminal until it ends."""
+    return progress_bar(bar_format=text, disable=None, leave=False)
+
+
 def parquet() -> Any:
     """Return the module that reads and writes Parquet.
 

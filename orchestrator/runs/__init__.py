@@ -7,7 +7,7 @@ in a folder. A `result` contains the rows, the indices and the record.
 
 from pathlib import Path
 
-from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.errors import InputError, did_you_mean, listed
 
 #: Scenarios that come with the bundle.
 SCENARIOS_FOLDER = Path(__file__).parent / "scenarios"
@@ -19,7 +19,7 @@ def names_in(folder: Path) -> list[str]:
 
 
 def find_toml(name: str, folder: Path, what: str, files: str) -> Path:
-    """Find a file of the program by its name, or one of the user's by its path.
+    """Find a file of the program by its name, in any case, or one of the user's by its path.
 
     Args:
         name: of the file, or its path, which ends in .toml.
@@ -33,8 +33,9 @@ def find_toml(name: str, folder: Path, what: str, files: str) -> Path:
     """
     if name.endswith(".toml"):
         return Path(name)
-    known = names_in(folder)
-    if name not in known:
-        hint = did_you_mean(name, known) or f"; there are {', '.join(known)}, or give {files}"
+    known = {other.casefold(): other for other in names_in(folder)}
+    if name.casefold() not in known:
+        hint = did_you_mean(name, known.values())
+        hint = hint or f"; there are {listed([*known.values()])}, or give {files}"
         raise InputError(f"no {what} {name!r}{hint}")
-    return folder / f"{name}.toml"
+    return folder / f"{known[name.casefold()]}.toml"

@@ -9,6 +9,7 @@ the current folder.
 from __future__ import annotations
 
 import json
+import logging
 import shutil
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -17,7 +18,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import TypedDict, Unpack
 
-from fmus.discovery import fingerprint
+from fmus.discovery import components, fingerprint
 from fmus.kinds import AUTO, FMI_VERSIONS, KINDS, NATIVE, PYTHON
 from orchestrator.cosim import write_ssp
 from orchestrator.machine.cache import made_once, read_cached, users_folder
@@ -25,8 +26,12 @@ from orchestrator.machine.children import run_module
 from orchestrator.machine.compilers import compiler_for, platforms
 from orchestrator.machine.disk import sha256_of, temporary_folder
 from orchestrator.machine.errors import InputError, last_line, reason
+from orchestrator.machine.lazy import progress_bar
 from orchestrator.runs.folder import replace_files
 from orchestrator.runs.wiring import closed_loop
+
+#: Takes lines on what takes long and happens only once; the command line shows them.
+LOG = logging.getLogger("auv_fmu")
 
 #: Default folders of `auv-fmu build`.
 DEFAULT_FOLDERS = {PYTHON: Path("fmus", "dist"), NATIVE: Path("fmus", "dist", "native")}
@@ -85,7 +90,7 @@ def build_bundle(
     Args:
         folder: made if it does not exist.
         force: move aside files of the user's that are in the way.
-        hear: called with a line when a library is made.
+        hear: called with a line when an FMU, or a library in it, is made.
         form: of the FMUs; with arrays, no SSP is written, because its connections are of scalars.
 
     Returns:
@@ -198,9 +203,7 @@ def _best_fmus(fmi: str) -> Path:
     for path in read_cached(CATEGORY, key_of(NATIVE, fmi)):
         # They were built earlier.
         return path.parent
-    try:
-        compiler_for(platforms(fmi))
-    except (OSError, ValueError):
+    if best_kind(fmi) == PYTHON:
         return current_fmus(PYTHON, fmi)
     try:
         return current_fmus(NATIVE, fmi)
@@ -211,6 +214,15 @@ def _best_fmus(fmi: str) -> Path:
         return folder
 
 
+def best_kind(fmi: str = FMI_VERSIONS[0]) -> str:
+    """Return the kind of FMU to build here: native with a C compiler, else Python."""
+    try:
+        compiler_for(platforms(fmi))
+    except (OSError, ValueError):
+        return PYTHON
+    return NATIVE
+
+
 def key_of(kind: str, fmi: str, platforms: str | None = None) -> str:
     """Cache key of the FMUs of the installed sources."""
     form = f"{kind} {fmi} {fingerprint(kind)}" + (f" {platforms}" if platforms else "")
@@ -219,6 +231,19 @@ def key_of(kind: str, fmi: str, platforms: str | None = None) -> str:
 
 def _built(*options: str) -> dict[str, bytes]:
     """Build FMUs, and return the content of the files by name."""
-    with temporary_folder() as folder:
-        run_fmus("build", folder, *options)
+    heard: list[str] = []
+    with (
+        temporary_folder() as folder,
+        progress_bar(total=len(components()), unit="FMU", disable=None, leave=False) as bar,
+    ):
+
+        def hear(line: str) -> None:
+            """Say that FMUs will be made, then count them."""
+            if heard:
+                bar.update()
+            else:
+                LOG.info("%s (only once) ...", line)
+            heard.append(line)
+
+        run_fmus("build", folder, *options, hear=hear)
         return {path.name: path.read_bytes() for path in sorted(folder.iterdir())}

@@ -415,8 +415,13 @@ def replace_files(
 def _cannot_write(folder: Path, error: Exception, rest: str = "") -> str:
     if isinstance(error, Taken):
         return f"{error}{rest}"
-    hint = "; choose another place (--out)" if isinstance(error, OSError) else ""
-    return f"cannot write into {folder}: {reason(error)}{rest}{hint}"
+    why, hint = reason(error), ""
+    if isinstance(error, OSError):
+        hint = "; choose another place (--out)"
+        if error.filename in (str(folder), str(folder.absolute())):
+            # Its name is in the message already.
+            why = error.strerror or why
+    return f"cannot write into {folder}: {why}{rest}{hint}"
 
 
 def _keep_files(ledger: Ledger) -> str:

@@ -12,6 +12,7 @@ import warnings
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import radians, tau
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -263,15 +264,26 @@ def left_behind(scenario: Scenario) -> str | None:
 
 
 def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
-    """Warn of possible omissions: inputs without a source, parameters of a vehicle.
+    """Warn of possible omissions: inputs without a source, parameters of a vehicle, degrees.
 
     `given` are inputs that get their values from events or tables.
 
     """
+    turns = _turns(system)
     if len(system.components) == 1:
         # No other component could feed it.
-        return []
-    return [*filter(None, (system.unfed_inputs(given), differing_vehicle(system)))]
+        return turns
+    return [*filter(None, (system.unfed_inputs(given), differing_vehicle(system))), *turns]
+
+
+def _turns(system: System) -> list[str]:
+    """Warn of angles beyond a full turn, which may be meant in degrees."""
+    return [
+        f"{name} = {value:g} rad is more than a full turn: if degrees are meant, write "
+        f"{radians(value):.5g}"
+        for name, value in system.parameters.items()
+        if isinstance(value, float) and abs(value) > tau and system.variable(name).unit == "rad"
+    ]
 
 
 def first_given(*values: T | None) -> T | None:
@@ -322,6 +334,11 @@ class Prepared:
         return loops_of(self.system)
 
     @property
+    def vehicles(self) -> tuple[Loop, ...]:
+        """Its loops that have a vehicle; none, if the system has no vehicle."""
+        return tuple(loop for loop in self.loops if loop.vehicle in self.system.components)
+
+    @property
     def identity(self) -> Identity:
         """Everything that decides its rows."""
         inputs = (table.digest for table in self.input_tables)
@@ -352,7 +369,7 @@ class Prepared:
         return replace(self, plan=replace(self.plan, system=system))
 
     def doubts(self) -> list[str]:
-        """Warn of possible omissions: inputs without a source, parameters of a vehicle."""
+        """Return warnings, as :func:`doubts_of` does."""
         given = {target for table in self.input_tables for target in table.targets}
         for action in (event.action for event in self.events):
             values = action.values if isinstance(action, Alter) else ()

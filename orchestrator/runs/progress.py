@@ -10,7 +10,7 @@ from orchestrator.cosim import Ending, Header
 from orchestrator.machine.lazy import progress_bar
 
 #: Shortest run for which a bar appears [s].
-_DELAY = 2.0
+_DELAY = 0.5
 
 
 class Progress:

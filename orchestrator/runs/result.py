@@ -389,12 +389,12 @@ def summary(values: Mapping[str, Any]) -> Iterator[tuple[str, str, list[str]]]:
                 unit = f" [{printed_unit(index.unit)}]" if index.unit else ""
                 title = f"{index.label} {index.members}{unit}"
                 numbers = np.atleast_1d(indices[index.name]).tolist()
-                yield vehicle, title, [*map(_number, numbers)]
+                yield vehicle, title, [*map(format_number, numbers)]
     if SMALLEST_DISTANCE in values:
-        yield "all", f"{SMALLEST_DISTANCE_LABEL} [m]", [_number(values[SMALLEST_DISTANCE])]
+        yield "all", f"{SMALLEST_DISTANCE_LABEL} [m]", [format_number(values[SMALLEST_DISTANCE])]
 
 
-def _number(value: float) -> str:
+def format_number(value: float) -> str:
     """Four digits, with an exponent for numbers below 1e-4 and from 1e7 on."""
     if value and not 1e-4 <= abs(value) < 1e7:
         return f"{value:.3e}"
@@ -662,7 +662,8 @@ def table_in(path: Path) -> Path:
         for file in (path, *(path / name for name in TABLES)):
             if locate(file).is_file():
                 return file
-    raise InputError(f"{path}: holds no result.csv or result.parquet")
+        what = "holds no result.csv or result.parquet" if path.exists() else "no such result"
+    raise InputError(f"{path}: {what}")
 
 
 def companion_tables(table: Path) -> list[Path]:

@@ -136,6 +136,7 @@ class WrittenRun:
         folder: of its files, until they are published.
         ending: how it has ended.
         metrics: content of metrics.json.
+        verdict: a line on it; empty if it failed, or has no reference and no limits.
 
     """
 
@@ -160,9 +161,9 @@ class WrittenRun:
         self.folder, self.prepared, loops = folder, prepared, prepared.loops
         self.name, self.ending, self.metrics = prepared.scenario.name, Ending(), dict[str, Any]()
         # Without figures only references are compared.
-        self.seen = VisibleRows(
-            {name for loop in loops for name in (loop.y_d if files.no_figures else loop.drawn())}
-        )
+        seen = [name for loop in loops for name in (loop.y_d if files.no_figures else loop.drawn())]
+        self.seen = VisibleRows({*seen} if prepared.vehicles else {*self.outputs})
+        self.verdict = ""
         self._watch, self._metrics = Watch(loops), Metrics(loops)
         self._table = TableFile.at(folder / f"result.{files.format}")
         self._real_time = None if files.real_time is None else RealTime(files.real_time)
@@ -185,6 +186,13 @@ class WrittenRun:
         """Step it to its end."""
         self.ending = self.prepared.run(self._observers, self._hooks)
         self.metrics = self._metrics.content(self.name, self.prepared.system)
+        if self.ending.failure is None:
+            self.verdict = self._metrics.verdict()
+
+    @property
+    def outputs(self) -> list[str]:
+        """Columns of the outputs of all components."""
+        return outputs_of(self.prepared.system)
 
     def give_up(self) -> None:
         """End it from another thread, while an FMU does not return."""
@@ -352,7 +360,7 @@ def _draw(
     if interrupts.urgent or ended_at_once:
         return
     drawn = [
-        Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.loops)
+        Drawn(run.prepared.scenario.legend, run.seen, scenario.z_up, run.prepared.vehicles)
         for run in done
     ]
     try:
@@ -374,7 +382,13 @@ def _draw(
 
 def _figures(prepared: Prepared) -> list[str]:
     """Files of the figures of a scenario."""
-    return figure_files(prepared.scenario.figure, prepared.scenario.stem, prepared.loops)
+    return figure_files(prepared.scenario.figure, prepared.scenario.stem, prepared.vehicles)
+
+
+def first_figure(folder: Path, prepared: Prepared) -> Path | None:
+    """Return the first figure of a run in its folder; None: there is no figure."""
+    paths = (folder / name for name in _figures(prepared))
+    return next((path for path in paths if path.is_file()), None)
 
 
 def _places(runs: Sequence[Prepared]) -> tuple[list[str], list[str]]:
@@ -410,15 +424,9 @@ def selected_columns(system: System, choice: str, is_companion: bool = False) ->
     """
     if choice == "all":
         return None
-    outputs = choice == "outputs"
-    names = [
-        f"{component.name}.{variable.name}"
-        for component in system.components.values()
-        for causality in (("output",) if outputs else ("input", "output"))
-        for variable in component.having(causality)
-    ]
-    if outputs:
-        return names
+    if choice == "outputs":
+        return outputs_of(system)
+    names = _columns(system, "input", "output")
     patterns = [pattern.strip() for pattern in choice.split(",") if pattern.strip()]
     if not patterns:
         raise InputError("--columns: name columns, or write all or outputs")
@@ -429,6 +437,20 @@ def selected_columns(system: System, choice: str, is_companion: bool = False) ->
     if is_companion:
         return [name for name in names if any(matches(name, pattern) for pattern in patterns)]
     return matching(names, patterns)
+
+
+def outputs_of(system: System) -> list[str]:
+    """Return the columns of all outputs."""
+    return _columns(system, "output")
+
+
+def _columns(system: System, *causalities: str) -> list[str]:
+    return [
+        f"{component.name}.{variable.name}"
+        for component in system.components.values()
+        for causality in causalities
+        for variable in component.having(causality)
+    ]
 
 
 # Checkpoints

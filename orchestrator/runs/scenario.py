@@ -220,6 +220,11 @@ def read_scenario(name: str) -> Scenario:
         InputError: there is no such scenario, or its file has a mistake.
 
     """
+    if name.endswith(".py"):
+        raise InputError(
+            f"{name}: a script is not run by itself; build its FMU (auv-fmu build {name}), and run "
+            "that or a scenario with it"
+        )
     path = find_toml(name, SCENARIOS_FOLDER, "scenario", _OTHERS)
     text = read_text(path, _NOT_A_SCENARIO)
     with explain_errors(path, _NOT_A_SCENARIO):

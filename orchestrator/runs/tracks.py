@@ -16,12 +16,19 @@ from pathlib import Path
 import numpy as np
 
 from fmus.discovery import fingerprint, name_of
-from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE, PYTHON
-from orchestrator.machine.compilers import compiler_for, platforms
+from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE
 from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, escape_unprintable
 from orchestrator.machine.texts import finite, in_docstring
-from orchestrator.runs.bundle import Form, kept_fmus, run_fmus, settings_of, words_of
+from orchestrator.runs.bundle import (
+    LOG,
+    Form,
+    best_kind,
+    kept_fmus,
+    run_fmus,
+    settings_of,
+    words_of,
+)
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tables import places_of_time, records, time_of
 from orchestrator.vehicle.signals import AXES
@@ -58,10 +65,7 @@ def with_planners(
     settings = settings_of(folder)
     made, fmi = settings["kind"], settings.get("fmi", FMI_VERSIONS[0])
     if kind == AUTO and made == NATIVE:
-        try:
-            compiler_for(platforms(fmi))
-        except (OSError, ValueError):
-            made = PYTHON
+        made = best_kind(fmi)
     words = tuple(words_of(Form(kind=made, fmi=fmi, platforms=targets)))
     planners = {component: str(_planner(table, made, words)) for component, table in tables.items()}
     return replace(scenario, components={**scenario.components, **planners})
@@ -81,6 +85,7 @@ def _built(module: str, text: str, kind: str, words: Sequence[str]) -> Path:
     key = sha256(f"{words} {fingerprint(kind)} {module} {text}".encode()).hexdigest()[:16]
 
     def build() -> dict[str, bytes]:
+        LOG.info("building the planner of the track (only once) ...")
         with temporary_folder() as folder:
             script = folder / f"{module}.py"
             script.write_text(text, encoding="utf-8")

@@ -101,6 +101,16 @@ class Sample(NamedTuple):
         """Names of the values, including the members of norms."""
         return tuple(name for key in self.ranges for name in norm_members(key))
 
+    @property
+    def remark(self) -> str | None:
+        """Remark for the user, if the points are less even than they could be."""
+        if self.method != SOBOL or not self.n & (self.n - 1):
+            return None
+        return (
+            f"sample: {SOBOL} spreads its samples evenly only if n is a power of two, such as "
+            f"{1 << self.n.bit_length()} instead of {self.n}"
+        )
+
 
 def norm_members(key: str) -> list[str]:
     """Return the names in a norm `|a, b, c|`, or any other name itself."""

@@ -60,7 +60,7 @@ _MANY = 100
 _TRIED = 10
 
 #: Seconds before a progress bar appears.
-_PATIENCE = 2.0
+_PATIENCE = 0.5
 
 #: Name of a study without a file.
 _NAMELESS = "study"
@@ -195,8 +195,10 @@ def complete_study(
     with open_store(folder, record, space.indices, means.force) as store:
         store.ledger.check(figure_files(ready.figures))
         if not store.is_done:
-            if not len(store) and (hint := faster(space, engine, ready.means, ready.own)):
-                say(hint)
+            if not len(store):
+                remark = study.sample and study.sample.remark
+                for hint in filter(None, (remark, faster(space, engine, ready.means, ready.own))):
+                    say(hint)
             engines = [engine]
             if isinstance(engine, BatchEngine):
                 # For runs that it refuses, since it gives no reason.

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import combinations
-from math import inf
+from math import inf, nan
 from types import ModuleType
 from typing import Any, NamedTuple
 
@@ -31,10 +31,12 @@ from orchestrator.vehicle.index import (
     parameter_estimates,
     peak_command,
     saturated_fraction,
+    settling,
     tracking,
 )
 from orchestrator.vehicle.reduction import reductions_of
-from orchestrator.vehicle.signals import STANDARD, Loop, Needs
+from orchestrator.vehicle.signals import ACTUATORS, STANDARD, Loop, Needs
+from orchestrator.vehicle.verdict import verdict
 
 #: The index of several vehicles: its name in files, and its label.
 SMALLEST_DISTANCE = "smallest_distance"
@@ -109,6 +111,7 @@ _REDUCERS = _read(
     saturated_fraction,
     final_error,
     tracking,
+    settling,
     estimate_error,
     parameter_estimates,
     largest_speed,
@@ -119,6 +122,9 @@ _REDUCERS = _read(
 def _index(name: str, label: str, symbol: str = "", is_metric: bool = False) -> Index:
     return Index(name, label, _REDUCERS[name], symbol, is_metric)
 
+
+#: The index of the verdict that is not in metrics.json.
+_SETTLING = _index("time_to_settle", "time to settle")
 
 #: All indices, in the order of the columns of a study; e is y - y_d with the true control point,
 #: efforts are of the applied signal. A run lacks an index if its system has no ports for it, or if
@@ -131,6 +137,7 @@ INDICES: tuple[Index, ...] = (
     _index("total_variation", "total variation", is_metric=True),
     _index("final_error", "final error", is_metric=True),
     _index("time_to_reach", "time to reach"),
+    _SETTLING,
     _index("late_error", "largest late error"),
     _index("estimate_error", "error of the estimated velocity"),
     _index("theta_hat_half", "estimate at half time", r"\hat{\theta}"),
@@ -335,11 +342,11 @@ class Indices:
 
 
 class Metrics(Indices):
-    """An observer that computes the content of metrics.json."""
+    """An observer that computes the content of metrics.json, and the verdict on a run."""
 
     def __init__(self, loops: Sequence[Loop] = (STANDARD,)) -> None:
         """Take the loops of the vehicles."""
-        super().__init__(loops, metrics())
+        super().__init__(loops, (*metrics(), _SETTLING))
 
     def content(self, scenario: str, system: System) -> dict[str, Any]:
         """Return the content of metrics.json; indices of several vehicles are under their names."""
@@ -358,11 +365,16 @@ class Metrics(Indices):
             return content | next(iter(vehicles.values()))
         return content | self.together | {VEHICLES: vehicles}
 
+    def verdict(self) -> str:
+        """Return the verdict on the run in a line; empty if it has not followed a reference."""
+        found = [self.found(loop) for loop in self._loops]
+        return verdict(found, ACTUATORS, self.together.get(SMALLEST_DISTANCE, nan))
+
     def _vehicle(self, loop: Loop, system: System) -> dict[str, Any]:
         numbers = self.found(loop)
         content: dict[str, Any] = {
             index.name: numbers[index.name] if len(index.units) > 1 else numbers[index.name][0]
-            for index in self._chosen
+            for index in metrics()
             if index.name in numbers
         }
         if loop.controller in system.components:

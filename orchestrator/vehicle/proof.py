@@ -5,7 +5,8 @@ Certificates are computed from the true state of the vehicle, which the controll
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from auv_fmu.paper.output_feedback import Gains
 from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
 from auv_fmu.paper.vehicle import Vehicle
 from auv_fmu.proof.attraction import Theorem, theorem
-from auv_fmu.proof.gain_conditions import observer_rate
+from auv_fmu.proof.gain_conditions import Condition, observer_rate
 from auv_fmu.proof.lyapunov import Errors, composite_errors, lyapunov
 from orchestrator.cosim import Ending, Header, PortName, System, Table, TableFile
 from orchestrator.machine.errors import InputError
@@ -104,12 +105,28 @@ def gain_check(system: System) -> str:
     for loop in loops:
         found = theorem_of(system, loop)
         if len(loops) > 1:
-            lines += [f"{loop.name}:", ""]
-        lines += [*stated(found), "", _NOTE, "", *_sampling(system, loop)]
+            lines.append(f"{loop.name}:")
+        saturation = system.value(PortName.read(f"{loop.controller}.saturation"))
+        number = 1 if _saturation(saturation, "") is Saturation.TANH else 2
+        lines += [_verdict(found.conditions, number), "", *stated(found), "", _NOTE, ""]
+        lines += _sampling(system, loop)
         if found == theorem(Vehicle(), CONTROL_POINT, Gains(), MAXIMUM_SLOPE[Saturation.TANH]):
             lines += ["", _PAPER]
         lines.append("")
     return "\n".join(lines[:-1])
+
+
+def _verdict(conditions: Sequence[Condition], theorem: int) -> str:
+    """Return how many of the conditions of a theorem hold; those with zetas are open at best."""
+    counts = Counter(condition.verdict for condition in conditions)
+    first, *others = (
+        (n, f"{'is' if n == 1 else 'are'} {verdict}")
+        for verdict in ("violated", "open", "met")
+        if (n := counts[verdict])
+    )
+    parts = [f"{first[0]} of the {len(conditions)} conditions of Theorem {theorem} {first[1]}"]
+    parts += [f"{n} {state}" for n, state in others]
+    return f"{', '.join(parts)}: no guarantee; the loop may still be stable"
 
 
 def stated(found: Theorem) -> Iterator[str]:

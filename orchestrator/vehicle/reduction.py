@@ -33,6 +33,7 @@ from orchestrator.machine.compilers import (
 )
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
+from orchestrator.machine.lazy import passing_line
 from orchestrator.vehicle.signals import Loop
 
 #: Category of the libraries in the cache.
@@ -289,7 +290,8 @@ def _compile(reducer: Reducer) -> bytes:
     compiler, text = own_compiler(), _text(reducer)
     if compiler is None or text is None:
         raise OSError(f"{reducer.name} cannot be compiled")
-    return compile_text(compiler, text, *_OPTIONS)
+    with passing_line(f"compiling {reducer.name} (only once) ..."):
+        return compile_text(compiler, text, *_OPTIONS)
 
 
 class Reduction:

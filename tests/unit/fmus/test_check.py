@@ -133,7 +133,7 @@ def test_other_modules_than_components_are_refused(tmp_path, mistakes):
     assert mistakes(path) == (
         2,
         [
-            f"{path}: not a component, which has a function outputs() (see `auv-fmu new`);"
+            f"{path}: not a component: it has no function outputs() (see `auv-fmu new`);"
             " if it has a class of PythonFMU, build it and check its FMU: "
             f"auv-fmu build {path}"
         ],

@@ -142,7 +142,7 @@ def test_a_slave_of_pythonfmu_runs_only_in_python(tmp_path, options, built):
     path.write_text(SLAVE)
     assert built(path, "--kind", "native", *options, "--out", tmp_path) == (
         2,
-        f"{path}: not a component, which has a function outputs() (see `auv-fmu new`); "
+        f"{path}: not a component: it has no function outputs() (see `auv-fmu new`); "
         "a class of PythonFMU needs --kind python",
     )
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import logging
 import shlex
 
 import pytest
 
 from orchestrator.commands.main import COMMANDS, parser
+from orchestrator.commands.streams import shown_log
+from orchestrator.runs import bundle
 
 
 def commands_of(parser):
@@ -64,3 +67,41 @@ def test_a_misspelt_choice_is_answered_with_a_suggestion_or_with_all(capsys):
         with pytest.raises(SystemExit, match="2"):
             parser(["run"]).parse_args(["run", "fig4", "--format", value])
         assert answer in capsys.readouterr().err
+
+
+def test_help_lists_every_command():
+    listed = [line.split()[0] for line in parser().format_help().splitlines() if line[:2] == "  "]
+    assert set(COMMANDS) <= set(listed)
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["fig4"], "no command 'fig4'; did you mean auv-fmu run fig4?"),
+        (["run", "fig4", "--stop-time", "x"], "argument --stop-time: 'x' is not a number"),
+        (["hosts", "--steps", "1.5"], "argument --steps: '1.5' is not a whole number"),
+    ],
+)
+def test_what_is_not_a_command_or_a_number_is_named(capsys, words, message):
+    with pytest.raises(SystemExit, match="2"):
+        parser(words).parse_args(words)
+    assert capsys.readouterr().err.endswith(f"error: {message}\n")
+
+
+def test_what_the_program_logs_is_shown_while_a_command_runs(capsys):
+    log = logging.getLogger("auv_fmu")
+    with shown_log():
+        log.warning("building")
+    log.warning("nothing")
+    assert capsys.readouterr().err == "auv-fmu: building\n"
+
+
+def no_compiler(_: object) -> None:
+    raise OSError("there is no C compiler")
+
+
+@pytest.mark.parametrize(("find", "kind"), [(lambda _: None, "native"), (no_compiler, "python")])
+def test_auto_is_the_kind_that_can_be_built(monkeypatch, find, kind):
+    monkeypatch.setattr(bundle, "compiler_for", find)
+    words = ["build", "--kind", "auto"]
+    assert parser(words).parse_args(words).kind == kind

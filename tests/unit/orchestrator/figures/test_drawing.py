@@ -124,8 +124,16 @@ def test_labels_do_not_depend_on_where_the_name_of_a_component_ends():
 def test_unknown_columns_are_refused_with_a_hint():
     with pytest.raises(InputError, match=r"no column matches 'plant.ta'; did you mean plant.ta"):
         plot([Drawn("run", loop_table())], ["plant.ta"])
-    with pytest.raises(InputError, match=r"name the columns to draw; there are mine.a, mine.b"):
-        plot([Drawn("own", table_of(TIME[:3], mine__a__x=0.0, mine__a__y=0.0, mine__b=1.0))])
+
+
+def test_without_a_vehicle_every_signal_that_changes_is_drawn_up_to_twelve_panels():
+    moving = {f"mine__y{i}": TIME * i for i in range(1, 15)}
+    table = table_of(TIME, mine__idle=0.0, **moving)
+    with pytest.warns(UserWarning, match="first 12 of 14 groups .* such as mine.y13"):
+        panels = [axes.get_ylabel() for axes in plot([Drawn("own", table)]).axes]
+    assert panels == [f"mine.y{i}" for i in range(1, 13)]
+    still = table_of(TIME, mine__a__x=0.0, mine__a__y=0.0, mine__b=1.0)
+    assert [axes.get_ylabel() for axes in plot([Drawn("own", still)]).axes] == ["mine.a", "mine.b"]
 
 
 def test_values_that_no_axis_can_show_are_refused(tmp_path):

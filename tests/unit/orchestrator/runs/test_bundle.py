@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -75,8 +76,10 @@ def builds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """Kinds that are built, with a compiler and an empty cache."""
     built = []
 
-    def run_fmus(module: str, folder: Path, *options: str) -> None:
+    def run_fmus(module: str, folder: Path, *options: str, hear: Callable[[str], None]) -> None:
         built.append(options[1])
+        hear("building 12 FMUs")
+        hear("AuvPlant for linux64, FMI 2.0")
         (folder / "build.json").write_text(json.dumps({"settings": {"kind": options[1]}}))
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
@@ -94,8 +97,12 @@ def auto() -> str:
     return settings_of(bundle.current_fmus())["kind"]
 
 
-def test_auto_builds_native_with_a_compiler_and_takes_it_afterwards_without(builds, monkeypatch):
+def test_auto_builds_native_with_a_compiler_and_takes_it_afterwards_without(
+    builds, monkeypatch, caplog
+):
+    caplog.set_level("INFO", "auv_fmu")
     assert (auto(), builds) == ("native", ["native"])
+    assert caplog.messages == ["building 12 FMUs (only once) ..."]
     monkeypatch.setattr(bundle, "compiler_for", none)
     assert (auto(), builds) == ("native", ["native"])
 
@@ -108,10 +115,10 @@ def test_auto_is_python_without_a_compiler(builds, monkeypatch):
 def test_auto_is_python_with_a_compiler_that_fails_and_says_so(builds, monkeypatch):
     build = bundle.run_fmus
 
-    def fails(module: str, folder: Path, *options: str) -> None:
+    def fails(module: str, folder: Path, *options: str, hear: Callable[[str], None]) -> None:
         if "native" in options:
             raise InputError("cc makes no AuvPlant")
-        build(module, folder, *options)
+        build(module, folder, *options, hear=hear)
 
     monkeypatch.setattr(bundle, "run_fmus", fails)
     with pytest.warns(UserWarning, match="Python kind .* because cc makes no AuvPlant") as warnings:

@@ -195,7 +195,7 @@ def test_a_folder_is_checked_and_built_by_its_name(tmp_path, monkeypatch, name):
         ),
         (
             ["build", "slave.py", "--kind", "native"],
-            "slave.py: not a component, which has a function outputs()",
+            "slave.py: not a component: it has no function outputs()",
         ),
     ],
 )

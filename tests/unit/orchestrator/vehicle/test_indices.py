@@ -95,7 +95,9 @@ def noise() -> dict[str, Callable[[np.ndarray], np.ndarray]]:
 def test_indices_of_known_signals():
     found = indices()
     # 10 exp(-t) is one metre at t = log 10, between two rows.
-    assert log(10.0) < found.pop("time_to_reach") < log(10.0) + H
+    reached = found.pop("time_to_reach")
+    assert log(10.0) < reached < log(10.0) + H
+    assert found.pop("time_to_settle") == reached
     expected = {
         "final_error.x": 10.0 * exp(-5.0),
         "final_error.y": 0.0,
@@ -115,7 +117,7 @@ def test_indices_of_known_signals():
 def test_sizes_of_blocks_change_nothing(blocks):
     """Results are equal to the last bit, although sums round."""
     signals = noise()
-    assert indices(signals).keys() >= set(index_columns()) - {"time_to_reach"}
+    assert indices(signals).keys() >= set(index_columns()) - {"time_to_reach", "time_to_settle"}
     assert indices(signals, blocks) == indices(signals)
 
 
@@ -144,7 +146,15 @@ def test_for_actuators_with_a_lag_the_end_of_a_step_counts():
         ),
         ("controller.dy_hat", ["estimate_error"]),
         ("plant.nu", ["largest_drift"]),
-        ("planner", ["late_error", "time_to_reach", *(f"final_error.{axis}" for axis in AXES)]),
+        (
+            "planner",
+            [
+                "late_error",
+                "time_to_settle",
+                "time_to_reach",
+                *(f"final_error.{axis}" for axis in AXES),
+            ],
+        ),
     ],
 )
 def test_indices_without_ports_are_left_out(group, without):
@@ -154,7 +164,20 @@ def test_indices_without_ports_are_left_out(group, without):
 
 def test_an_index_that_is_never_reached_is_left_out():
     away = {**SIGNALS, "plant.eta.z": lambda t: 0.0 * t + 1.01}
-    assert indices().keys() - indices(away).keys() == {"time_to_reach"}
+    assert indices().keys() - indices(away).keys() == {"time_to_reach", "time_to_settle"}
+
+
+def test_a_vehicle_that_leaves_its_reference_has_not_settled():
+    """It reaches its reference at once, and leaves it for a while, or at the end."""
+    near = {name: signal for name, signal in SIGNALS.items() if name != "plant.eta.x"}
+    on = {**near, "plant.eta.x": lambda t: np.cos(t) - ELL}
+    assert (indices(on)["time_to_reach"], indices(on)["time_to_settle"]) == (0.0, 0.0)
+    between = {**on, "plant.eta.z": lambda t: 2.0 * ((t > 3.0) & (t < 4.0))}
+    assert indices(between)["time_to_reach"] == 0.0
+    assert indices(between)["time_to_settle"] == pytest.approx(4.0)
+    at_the_end = {**on, "plant.eta.z": lambda t: 2.0 * (t > 9.0)}
+    assert indices(at_the_end)["time_to_reach"] == 0.0
+    assert "time_to_settle" not in indices(at_the_end)
 
 
 def test_closed_loop_has_all_indices():
@@ -162,7 +185,9 @@ def test_closed_loop_has_all_indices():
     experiment, observer = Experiment(4.0, 0.02), Indices()
     simulate_plan(make_plan(system, experiment, loop="auto"), [observer])
     found = observer.values().keys()
-    assert set(index_columns()) - {"time_to_reach"} <= found <= set(index_columns())
+    assert (
+        set(index_columns()) - {"time_to_reach", "time_to_settle"} <= found <= set(index_columns())
+    )
 
 
 @pytest.mark.parametrize("module", [*iter_modules(index.__path__)], ids=lambda module: module.name)
