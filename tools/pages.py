@@ -1,8 +1,8 @@
-"""Fill in the parts of pages that come from the code, and write the schemas for editors.
+"""Fill in the parts of pages that come from the code, and write schemas and codemeta.json.
 
 `python tools/pages.py` rewrites every file that is out of date; a test fails while there is one.
 Pages are written by hand, except the parts between `<!-- filled: NAME -->` and `<!-- / -->`.
-`docs/schemas` is generated as a whole.
+`docs/schemas`, for editors, and `codemeta.json`, for archives, are generated as a whole.
 
 Numbers that take minutes to compute are printed by other tools: `page_numbers.py` for many pages,
 `printed_table.py` for docs/explanation/table.md. `pictures.py` draws the figures of studies and
@@ -17,6 +17,7 @@ import csv
 import json
 import re
 import textwrap
+import tomllib
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import cbrt, radians, sqrt, tan
@@ -25,6 +26,7 @@ from typing import Any
 
 from pydantic.json_schema import GenerateJsonSchema
 
+from auv_fmu import __citation__, __version__
 from auv_fmu.paper.control_point import ELL
 from auv_fmu.paper.output_feedback import Gains
 from auv_fmu.paper.saturation import MAXIMUM_SLOPE, Saturation
@@ -165,6 +167,7 @@ def files() -> dict[Path, str]:
         **component_pages(),
         DOCS / "schemas" / "scenario.json": _json(ScenarioFile),
         DOCS / "schemas" / "study.json": _json(StudyFile),
+        ROOT / "codemeta.json": codemeta(),
     }
 
 
@@ -217,6 +220,26 @@ def component_pages() -> dict[Path, str]:
             lines.append(line)
         pages[page_of(name)] = "\n".join(lines) + "\n"
     return pages
+
+
+def codemeta() -> str:
+    """Metadata of the project, from pyproject.toml."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    [paper_title] = re.findall(r'"(.+)"', __citation__)
+    software = {
+        "@context": "https://w3id.org/codemeta/3.0",
+        "@type": "SoftwareSourceCode",
+        **{name: project[name] for name in ("name", "description", "keywords")},
+        "version": __version__,
+        "license": f"https://spdx.org/licenses/{project['license']}",
+        "author": [{"@type": "Organization", **author} for author in project["authors"]],
+        "programmingLanguage": ["Python", "C", "TypeScript"],
+        "operatingSystem": "Linux",
+        "runtimePlatform": f"Python {project['requires-python']}",
+        "softwareRequirements": project["dependencies"],
+        "referencePublication": {"@type": "ScholarlyArticle", "name": paper_title},
+    }
+    return json.dumps(software, indent=2) + "\n"
 
 
 def filled_in(page: Path, values: Mapping[str, str]) -> str:

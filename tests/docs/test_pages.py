@@ -96,6 +96,19 @@ def test_packages_say_that_they_are_typed():
         assert Path(folder, "py.typed").is_file()
 
 
-def test_citation_is_of_this_version():
+def test_citation_and_recipe_are_of_this_package():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    recipe = (ROOT / "recipe" / "recipe.yaml").read_text(encoding="utf-8")
     assert f"\nversion: {__version__}\n" in citation
+    assert f'\n  version: "{__version__}"\n' in recipe
+    assert f"\nlicense: {project['license']}\n" in citation
+    assert f"\n  license: {project['license']}\n" in recipe
+    [keywords] = re.findall(r"^keywords:\n((?:  - .*\n)+)", citation, re.MULTILINE)
+    assert [line.removeprefix("  - ") for line in keywords.splitlines()] == project["keywords"]
+    oldest = project["requires-python"].removeprefix(">=")
+    assert f'\n  python_min: "{oldest}"\n' in recipe
+    # conda-forge divides fmpy and matplotlib, and names the lean part fmpy-base.
+    _, needed = re.sub(r"-base(?= >)", "", recipe).split("python >=${{ python_min }}\n")
+    needed, _ = needed.split("\n\n", 1)
+    assert [line.replace(" ", "")[1:] for line in needed.splitlines()] == project["dependencies"]
