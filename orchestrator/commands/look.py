@@ -21,7 +21,7 @@ from orchestrator.commands.options import (
 from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.cosim import Observer
 from orchestrator.figures.drawing import one_figure, plot, save, told_apart, wanted_columns
-from orchestrator.figures.film import Film, animate
+from orchestrator.figures.film import FILMS, Film, animate, default_ending
 from orchestrator.figures.run_figures import FIGURES, main_figure
 from orchestrator.figures.style import FIGURE_WIDTH, Drawn, Look
 from orchestrator.figures.visible import VisibleRows
@@ -133,20 +133,28 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
     add_system(parser)
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
-    fps, (width, height), _ = film = Film()
+    video, picture = FILMS[".mp4"], FILMS[".gif"]
+    sizes = " and ".join(
+        "{}x{} of {}".format(*film.size, ending) for ending, film in FILMS.items()
+    )
     parser.add_argument(
-        "--fps", type=int, default=fps, metavar="N",
-        help=f"number of frames per second; default: {fps}",
+        "--fps", type=int, metavar="N",
+        help=f"number of frames per second; default: {video.fps} of .mp4 and {picture.fps} of .gif",
     )  # fmt: skip
     parser.add_argument(
-        "--size", type=_size, default=film.size, metavar="WIDTHxHEIGHT",
-        help=f"size of the picture in pixels; default: {width}x{height}",
+        "--size", type=_size, metavar="WIDTHxHEIGHT",
+        help=f"size of the picture in pixels; default: {sizes}",
     )  # fmt: skip
     parser.add_argument(
         "--speed", type=float, metavar="X",
-        help="seconds of the run in a second of the film; default: the film lasts 10 s",
+        help="seconds of the run in a second of the film; default: 1 of .mp4, which is real time; "
+        "a .gif lasts 10 s",
     )  # fmt: skip
-    _add_file(parser, "film to write: .gif or .mp4; default: results/SCENARIO.gif")
+    _add_file(
+        parser,
+        "film to write: .mp4 or .gif; default: results/SCENARIO.mp4, or .gif where ffmpeg is not "
+        "installed",
+    )
     parser.set_defaults(action=_animate)
 
 
@@ -256,8 +264,11 @@ def _live(options: argparse.Namespace) -> int:
 
 def _animate(options: argparse.Namespace) -> int:
     scenario, system = read_system(options)
-    out = options.out or Path("results", f"{scenario.stem}.gif")
-    film = Film(options.fps, options.size, options.speed)
+    out = options.out or Path("results", f"{scenario.stem}{default_ending()}")
+    given = {name: vars(options)[name] for name in Film._fields}
+    film = FILMS.get(out.suffix, Film())._replace(
+        **{name: value for name, value in given.items() if value is not None}
+    )
     film.check(out)
     prepared = prepare(scenario, system, request(options))
     loops = prepared.loops
@@ -269,7 +280,9 @@ def _animate(options: argparse.Namespace) -> int:
         for loop in loops:
             if missing := seen.missing(*loop.for_control_point()):
                 raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-        animate(scenario.title or scenario.name, run, folder / out.name, film)
+        # A title may name both runs of a comparison.
+        shown = f" (shown: {scenario.label})" if scenario.compare and scenario.label else ""
+        animate(f"{scenario.title or scenario.name}{shown}", run, folder / out.name, film)
     return status(scenario.name, ending)
 
 

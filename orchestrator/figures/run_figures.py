@@ -251,8 +251,8 @@ def _zoom(axes: Any) -> float:
     """Return the zoom with which a box of zoom 1, its numbers and labels fill their cell."""
     place, figure = axes.get_subplotspec().get_topmost_subplotspec(), axes.get_figure()
     grid = place.get_gridspec()
-    heights = np.array(grid.get_height_ratios() or [1.0] * grid.nrows)
-    share = np.array((len(place.colspan) / grid.ncols, heights[place.rowspan].sum() / heights.sum()))
+    parts = ((grid.get_width_ratios(), place.colspan), (grid.get_height_ratios(), place.rowspan))
+    share = [sum(ratios[i] for i in span) / sum(ratios) for ratios, span in parts]
     cell = share * figure.get_size_inches()
     to_axes = axes.transData + axes.transAxes.inverted()
     half = np.abs(to_axes.transform(_corners(axes).reshape(-1, 2)) - 0.5).max(axis=0)

@@ -124,8 +124,15 @@ def test_labels_do_not_depend_on_where_the_name_of_a_component_ends():
 def test_unknown_columns_are_refused_with_a_hint():
     with pytest.raises(InputError, match=r"no column matches 'plant.ta'; did you mean plant.ta"):
         plot([Drawn("run", loop_table())], ["plant.ta"])
-    with pytest.raises(InputError, match=r"name the columns to draw; there are mine.a, mine.b"):
-        plot([Drawn("own", table_of(TIME[:3], mine__a__x=0.0, mine__a__y=0.0, mine__b=1.0))])
+    many = table_of(TIME[:3], mine__a__x=0.0, mine__a__y=0.0, **{f"mine__b{i}": 1.0 for i in range(12)})
+    with pytest.raises(InputError, match=r"name the columns to draw; there are mine.a, mine.b0"):
+        plot([Drawn("own", many)])
+
+
+def test_all_columns_of_a_run_without_a_vehicle_are_drawn():
+    few = table_of(TIME[:3], mine__a__x=0.0, mine__a__y=0.0, mine__b=1.0)
+    labels = [axes.get_ylabel() for axes in plot([Drawn("own", few)]).axes]
+    assert labels == ["mine.a", "mine.b"]
 
 
 def test_values_that_no_axis_can_show_are_refused(tmp_path):
