@@ -14,9 +14,9 @@ from tempfile import TemporaryDirectory
 from PIL import Image
 
 from orchestrator.commands.main import main as auv_fmu
+from orchestrator.figures.drawing import SETTINGS
 from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.study_values import Values
-from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import names
 from orchestrator.studies.space import Space

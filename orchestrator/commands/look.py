@@ -134,9 +134,7 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
     video, picture = FILMS[".mp4"], FILMS[".gif"]
-    sizes = " and ".join(
-        "{}x{} of {}".format(*film.size, ending) for ending, film in FILMS.items()
-    )
+    sizes = " and ".join("{}x{} of {}".format(*film.size, ending) for ending, film in FILMS.items())
     parser.add_argument(
         "--fps", type=int, metavar="N",
         help=f"number of frames per second; default: {video.fps} of .mp4 and {picture.fps} of .gif",

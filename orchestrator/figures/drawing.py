@@ -18,7 +18,6 @@ from math import lcm
 from pathlib import Path
 from typing import Any
 
-import auv_fmu
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,6 +26,7 @@ from matplotlib.font_manager import FontProperties, findfont, fontManager
 from matplotlib.lines import Line2D
 from tqdm import tqdm
 
+import auv_fmu
 from orchestrator.cosim import Table
 from orchestrator.figures.run_figures import (
     FIGURES,
@@ -64,7 +64,7 @@ SETTINGS: Any = mpl.rc_params_from_file(
 )
 
 #: Settings with which matplotlib does not lay out a figure again.
-_LAID_OUT = {"figure.constrained_layout.use": False}
+_LAID_OUT: Any = {"figure.constrained_layout.use": False}
 
 #: Least and largest width of a figure [in], and size of its texts [pt].
 _WIDTHS, _TEXT_SIZES = (2.0, 40.0), (4.0, 40.0)
@@ -86,9 +86,9 @@ _HEADING_LETTERS, _LETTERS, _LINE = 1.42, 1.93, 7
 
 #: Least width of panels that are side by side, as a multiple of the size of their texts, and their
 #: height below each other as a share of the usual one, so that a column of a page holds them.
-_ABREAST, _FLATTER = 24.0, 0.75
+_ABREAST, _FLATTER = 24.0, 0.73
 
-#: Largest number of panels if nobody says which columns to draw.
+#: Largest number of panels of a plot without patterns.
 _MOST_PANELS = 12
 
 #: Characters of a name as long as a panel is high.
@@ -147,7 +147,7 @@ def styled(look: Look = Look()) -> Iterator[None]:  # noqa: B008
 
 
 def _apply(look: Look, log: logging.Logger) -> None:
-    """Change the settings to those of a look."""
+    """Change the settings of matplotlib to a look."""
     if look.style:
         _apply_style(look, log)
     if look.width is not None:
@@ -158,12 +158,13 @@ def _apply(look: Look, log: logging.Logger) -> None:
         mpl.rcParams["font.size"] = look.size
     if look.font:
         _check_font(look.font)
-        shapes = {"rm": "", "it": ":italic", "bf": ":bold"}
         mpl.rcParams.update(
             {
                 "font.family": look.font,
                 "mathtext.fontset": "custom",
-                **{f"mathtext.{key}": f"{look.font}{shape}" for key, shape in shapes.items()},
+                "mathtext.rm": look.font,
+                "mathtext.it": f"{look.font}:italic",
+                "mathtext.bf": f"{look.font}:bold",
             }
         )
 
@@ -212,7 +213,8 @@ def _check_font(font: str) -> None:
     except ValueError as error:
         hint = did_you_mean(font, fontManager.get_font_names())
         raise InputError(
-            f"font {font!r} is not installed" + (hint or "; serif and sans-serif always are")
+            f"font {font!r} is not installed"
+            + (hint or "; DejaVu Sans and DejaVu Serif always are")
         ) from error
 
 
@@ -519,7 +521,7 @@ def plot(
         figure.set_figheight((_MARGIN + _PANEL * len(panels)) * text_scale())
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         has_means = [
-            _draw_group(place, group, unit, members, runs)
+            _draw_group(figure, place, group, unit, members, runs)
             for place, ((group, unit), members) in zip(axes, panels.items(), strict=True)
         ]
         over_time(list(axes), runs, any(has_means))
@@ -537,7 +539,12 @@ def plot(
 
 
 def _draw_group(
-    axes: Axes, group: str, unit: str, members: Sequence[str], runs: Sequence[Drawn]
+    figure: Figure,
+    axes: Axes,
+    group: str,
+    unit: str,
+    members: Sequence[str],
+    runs: Sequence[Drawn],
 ) -> bool:
     """Draw the members of a group; return true if there are means among the lines.
 
@@ -576,7 +583,7 @@ def _draw_group(
         ]
         axes.legend(
             handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0),
-            ncols=_legend_columns(axes.get_figure(), lines),
+            ncols=_legend_columns(figure, lines),
         )  # fmt: skip
     return has_means
 

@@ -112,7 +112,7 @@ FILMS = {".mp4": Film(25, (1920, 1080), 1.0), ".gif": Film()}
 
 
 def default_ending() -> str:
-    """Return the ending of films here: that of a video, if ffmpeg is installed."""
+    """Return .mp4 if ffmpeg is installed, else .gif."""
     return ".mp4" if FFMpegWriter.isAvailable() else ".gif"
 
 

@@ -60,9 +60,13 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import SubplotSpec
     from matplotlib.transforms import Transform
 
-#: Distance of the numbers of z from their axis, of names from the numbers of x and y, and height of
-#: a name [pt]; room for numbers and names around the box of a path [in]. With texts of 10 pt.
-_Z_PAD, _BELOW, _SMALL, _AROUND_BOX = 6, 32, 4, (1.0, 1.1)
+#: Distance of the numbers of z from their axis, of the names of x and y from theirs, and what a
+#: letter of their numbers adds to it, with texts of 10 pt; of the name of z from its axis [pt].
+_Z_PAD, _BELOW, _LETTER, _ABOVE = 6, 16, 2, 4
+
+#: Room for numbers and names around the box of a path, and for the legend above; least size of the
+#: box; least size of a cell whose axes have more than a few numbers. With texts of 10 pt [in].
+_AROUND_BOX, _LEGEND, _LEAST_BOX, _LARGE_CELL = (1.1, 0.6), 0.4, 0.5, 3.0
 
 #: Least length of an axis of a path, as a share of the longest: a straight line gets a box.
 _FLATTEST = 0.3
@@ -223,8 +227,10 @@ def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     if not z_up:
         axes.invert_yaxis()
         axes.invert_zaxis()
+    cell = _cell_size(axes)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.get_major_locator().set_params(nbins=4, steps=None)
+        n = 4 if cell.min() > _LARGE_CELL else 3
+        axis.get_major_locator().set_params(nbins=n, steps=None)
     axes.tick_params(labelsize="small", pad=0)
     # Any closer, a tick and a minus sign look like one dash.
     axes.zaxis.set_tick_params(pad=_Z_PAD)
@@ -233,7 +239,7 @@ def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
         artist.set(clip_on=False, in_layout=False)
     box = np.maximum(extent, 0.5 * extent.max())
     axes.set_box_aspect(box)
-    axes.set_box_aspect(box, zoom=_zoom(axes))
+    axes.set_box_aspect(box, zoom=_zoom(axes, cell))
     _label_box(axes, earth_axes(z_up))
 
 
@@ -247,37 +253,37 @@ def _corners(axes: Any) -> np.ndarray:
     return np.column_stack((x, y)).reshape(2, 2, 2, 2)
 
 
-def _zoom(axes: Any) -> float:
-    """Return the zoom with which a box of zoom 1, its numbers and labels fill their cell."""
-    place, figure = axes.get_subplotspec().get_topmost_subplotspec(), axes.get_figure()
+def _cell_size(axes: Any) -> np.ndarray:
+    """Return the width and height of the cell of a path [in], as if texts had 10 pt."""
+    place = axes.get_subplotspec().get_topmost_subplotspec()
     grid = place.get_gridspec()
     parts = ((grid.get_width_ratios(), place.colspan), (grid.get_height_ratios(), place.rowspan))
     share = [sum(ratios[i] for i in span) / sum(ratios) for ratios, span in parts]
-    cell = share * figure.get_size_inches()
+    size: np.ndarray = share * axes.get_figure().get_size_inches() / text_scale()
+    return size - (0.0, _LEGEND)
+
+
+def _zoom(axes: Any, cell: np.ndarray) -> float:
+    """Return the zoom with which a box of zoom 1, its numbers and names fill their cell."""
     to_axes = axes.transData + axes.transAxes.inverted()
     half = np.abs(to_axes.transform(_corners(axes).reshape(-1, 2)) - 0.5).max(axis=0)
-    room = cell - text_scale() * np.array(_AROUND_BOX)
-    return float((room / (2.0 * half * room.min())).min())
+    room = np.maximum(cell - _AROUND_BOX, _LEAST_BOX)
+    return float((room / (2.0 * half * cell.min())).min())
 
 
 def _label_box(axes: Any, names: tuple[str, str, str]) -> None:
     """Write the names of the axes beside the edges that have numbers: x and y below, z above."""
-    corners = _corners(axes)
-    text = {"textcoords": "offset points", "annotation_clip": False}
-    for k, side in ((0, "right"), (1, "left")):
-        low, high = np.moveaxis(corners, k, 0).reshape(2, 4, 2)
-        edge = int((low + high)[:, 1].argmin())
-        numbers = (axes.xaxis, axes.yaxis)[k]
-        longest = max(map(len, numbers.get_major_formatter().format_ticks(numbers.get_majorticklocs())))
-        down = _BELOW + _SMALL * longest
-        axes.annotate(
-            names[k], (low[edge] + high[edge]) / 2, ha=side, va="top",
-            xytext=text_scale() * np.array((-down if k == 0 else down, -down)) / 2, **text,
-        )
-    ends = np.moveaxis(corners, 2, 0).reshape(2, 4, 2)
-    edge = int(ends.mean(axis=0)[:, 0].argmax())
-    top = ends[ends[:, edge, 1].argmax(), edge]
-    axes.annotate(names[2], top, xytext=(0, _SMALL), ha="center", va="bottom", **text)
+    corners, offset = _corners(axes), {"textcoords": "offset points", "annotation_clip": False}
+    for k, (axis, side, ha) in enumerate(((axes.xaxis, -1, "right"), (axes.yaxis, 1, "left"))):
+        middles = corners.mean(axis=k).reshape(4, 2)
+        lowest = middles[middles[:, 1].argmin()]
+        numbers = axis.get_major_formatter().format_ticks(axis.get_majorticklocs())
+        away = text_scale() * (_BELOW + _LETTER * max(map(len, numbers)))
+        axes.annotate(names[k], lowest, xytext=(side * away, -away), ha=ha, va="top", **offset)
+    edges = corners.reshape(4, 2, 2)
+    right = edges[edges[..., 0].mean(axis=1).argmax()]
+    top = right[right[:, 1].argmax()]
+    axes.annotate(names[2], top, xytext=(0, _ABOVE), ha="center", va="bottom", **offset)
 
 
 def _axes_from_above(cell: Cell, z_up: bool) -> Any:
@@ -590,7 +596,7 @@ def _vehicle_label(run: Drawn, loop: Loop) -> str | None:
 
 
 def _marks(run: Drawn, loop: Loop) -> dict[str, Any]:
-    """Return the marks on the line of one of a few vehicles, at other rows than those of others."""
+    """Return the marks on the line of a vehicle, which do not cover another's; none of many."""
     n, i = len(run.loops), run.loops.index(loop)
     if n > _MOST_NAMED:
         return {}
@@ -695,7 +701,7 @@ def _whose(runs: Sequence[Drawn]) -> str:
     return f" ({escape_math(runs[0].label)})" if len(runs) > 1 else ""
 
 
-PATH = Panel("path", Loop.for_control_point, _path, 3.4)
+PATH = Panel("path", Loop.for_control_point, _path, 3.8)
 FROM_ABOVE = Panel("path from above", Loop.for_control_point, _path_from_above)
 ALL_ERRORS = Panel("tracking errors", Loop.for_tracking, _all_errors, 2.8)
 ERRORS = Panel("tracking errors", Loop.for_tracking, _errors, 4.0)

@@ -357,7 +357,7 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
         axes.set_title(name)
         has_gaps |= bool(np.isnan(matrix).any())
         has_small |= bool((np.abs(matrix) < _NOTHING).any())
-    _turn_long_names(panels.flat[-1])
+    _turn_long_names(figure, panels.flat[-1])
     names = max(name.get_window_extent().height for name in axes.get_xticklabels()) / figure.dpi
     figure.set_figheight(figure.get_figheight() + max(0.0, names - _NAMES))
     figure.colorbar(image, ax=list(panels.flat), label="rank correlation")
@@ -369,10 +369,10 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
     return figure
 
 
-def _turn_long_names(axes: Axes) -> None:
+def _turn_long_names(figure: Figure, axes: Axes) -> None:
     """Turn the names of the columns of a matrix, if one of them is wider than its column."""
     names = axes.get_xticklabels()
-    share = FIGURE_WIDTH * axes.get_figure().dpi * _MATRIX / len(names)
+    share = figure.bbox.width * _MATRIX / len(names)
     if max(name.get_window_extent().width for name in names) > share:
         axes.tick_params("x", labelrotation=45)
         for name in axes.get_xticklabels():

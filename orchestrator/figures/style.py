@@ -63,7 +63,7 @@ Style: TypeAlias = str | Path | Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Look:
-    """How a figure looks.
+    """The appearance of a figure.
 
     Attributes:
         width: of the figure [in]; None: the style's, or 7.2.
