@@ -57,15 +57,15 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "what",
-        nargs="*",
+        nargs="+",
         metavar="RESULT|PATTERN",
         help="result folders or tables, and patterns of signals such as plant.y.*; default "
         "patterns: errors, commands and estimates",
     )
     parser.add_argument(
         "--figure", nargs="?", const="", metavar="NAME",
-        help="instead of signals draw the figure of the scenario, with the run that it is compared "
-        f"with, or the figure NAME: {', '.join(FIGURES)}",
+        help="after the results: draw, instead of signals, the figure of the scenario with the run "
+        f"that it is compared with, or another: {', '.join(FIGURES)}",
     )  # fmt: skip
     parser.add_argument("--title", default="", metavar="TEXT", help="heading; default: none")
     parser.add_argument(
@@ -83,7 +83,7 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=float, metavar="PT", help="size of texts; default: 10")
     parser.add_argument(
         "--style", default="", metavar="FILE.mplstyle",
-        help="style of matplotlib, or the name of one, applied over auv_fmu.figures",
+        help="style of matplotlib, or the name of one, applied over auv_fmu.figures; default: none",
     )  # fmt: skip
     _add_file(parser, "image to write: .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)
@@ -174,9 +174,6 @@ def _plot(options: argparse.Namespace) -> int:
         raise InputError(f"{options.out}: must end with {', '.join(_PLOTS[:-1])} or {_PLOTS[-1]}")
     paths = [Path(text) for text in options.what if _is_there(text)]
     patterns = [text for text in options.what if not _is_there(text)]
-    if not options.what:
-        hint = f"; write {options.figure} before --figure" if options.figure else ""
-        raise InputError(f"no result to plot{hint}")
     if not paths:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
     look = Look(options.width, options.font, options.size, options.style)
