@@ -86,7 +86,7 @@ _HEADING_LETTERS, _LETTERS, _LINE = 1.42, 1.93, 7
 
 #: Least width of panels that are side by side, as a multiple of the size of their texts, and their
 #: height below each other as a share of the usual one, so that a column of a page holds them.
-_ABREAST, _FLATTER = 24.0, 0.73
+_ABREAST, _FLATTER = 24.0, 0.72
 
 #: Largest number of panels of a plot without patterns.
 _MOST_PANELS = 12

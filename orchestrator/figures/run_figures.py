@@ -171,8 +171,10 @@ def title(axes: Axes, text: str) -> None:
     if n < 2:
         axes.set_title(text)
         return
+    # A wider legend would move the square of a path.
+    abreast = 2 if axes.name == "3d" else 3
     axes.legend(
-        title=text, alignment="left", ncols=n if n < 4 else -(-n // 2), loc="lower left",
+        title=text, alignment="left", ncols=n if n <= abreast else -(-n // 2), loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
     )  # fmt: skip
 
@@ -701,7 +703,7 @@ def _whose(runs: Sequence[Drawn]) -> str:
     return f" ({escape_math(runs[0].label)})" if len(runs) > 1 else ""
 
 
-PATH = Panel("path", Loop.for_control_point, _path, 3.8)
+PATH = Panel("path", Loop.for_control_point, _path, 4.0)
 FROM_ABOVE = Panel("path from above", Loop.for_control_point, _path_from_above)
 ALL_ERRORS = Panel("tracking errors", Loop.for_tracking, _all_errors, 2.8)
 ERRORS = Panel("tracking errors", Loop.for_tracking, _errors, 4.0)
