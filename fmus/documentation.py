@@ -19,6 +19,7 @@ from fmus.kinds import NATIVE, PYTHON
 from fmus.ports.definition import Model
 from fmus.ports.description import TYPES
 from fmus.ports.port import FAULT, Port
+from orchestrator.machine.mathematics import typeset
 
 #: The icon of every component.
 ICON = Path(__file__).with_name("icon.png")
@@ -249,8 +250,8 @@ def fmu_documents(source: Source, kind: str = PYTHON, fmi: str = "2") -> dict[st
 
 def html_of(title: str, page: str, citation: str = "") -> str:
     """Render a page in Markdown as one HTML file."""
-    body = MarkdownIt("commonmark").enable("table").render(page)
-    body = body.replace("<table>", '<div class="table"><table>')
+    body = typeset(MarkdownIt("commonmark").enable("table").render(page))
+    body = body.replace("<table>", '<div class="table" tabindex="0"><table>')
     body = body.replace("</table>", "</table></div>")
     return Template(_HTML.read_text(encoding="utf-8")).substitute(
         title=title, citation=citation, body=body

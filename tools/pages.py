@@ -17,8 +17,7 @@ import json
 import re
 import textwrap
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Mapping, Sequence
-from itertools import zip_longest
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from math import cbrt, radians, sqrt, tan
 from pathlib import Path
 from typing import Any
@@ -67,6 +66,27 @@ EXAMPLES = ROOT / "examples"
 
 #: Folder of the pictures in docs/; pictures of studies are in its subfolder `studies`.
 PICTURES = "images"
+
+#: Folder in it of the small pictures of the gallery, and the figure of each study there.
+SMALL = "small"
+SMALL_STUDIES = {
+    "gains": "front-peak",
+    "robustness": "error",
+    "noise": "saturation",
+    "attraction": "place",
+    "sampling": "observer",
+    "formation": "messages",
+    "distance": "commands",
+}
+
+#: Scenarios that come first in the gallery, the best first.
+_BEST = (
+    *("fig5", "formation-lost-link", "remus", "sea", "formation-v", "fig4", "fault-sensor", "path"),
+    *("current-step", "formation-change", "fig6", "fault-thruster", "fig7a", "fig7b", "fig7c"),
+)
+
+#: End of the titles of scenarios with two controllers, which the gallery leaves out.
+_BOTH = ": proposed and PD controller"
 
 _PLACE = re.compile(r"(<!-- filled: (\w+) -->).*?(<!-- / -->)", re.DOTALL)
 
@@ -128,7 +148,7 @@ def files() -> dict[Path, str]:
     filled = {
         "explanation/paper.md": paper(),
         "explanation/language.md": {"mathematics": mathematics()},
-        "gallery.md": {"scenarios": gallery()},
+        "gallery.md": gallery(),
         "reference/command-line.md": command_line(),
         "reference/components/README.md": {"components": bundle()},
         "reference/examples.md": examples(),
@@ -471,11 +491,17 @@ def _first_line(name: str) -> str:
     return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
 
 
-def gallery() -> str:
-    """The scenarios in docs/gallery.md, two in a row."""
-    cells = [*map(_scenario, sorted(map(read_scenario, names()), key=_place))]
-    pairs = zip_longest(cells[::2], cells[1::2], fillvalue="")
-    return "\n".join(["| | |", "|---|---|", *(f"| {left} | {right} |" for left, right in pairs)])
+def gallery() -> dict[str, str]:
+    """The pictures in docs/gallery.md: scenarios, and a figure of each study."""
+    scenarios = sorted(map(read_scenario, names()), key=_place)
+    return {
+        "scenarios": _grid(map(_scenario, scenarios)),
+        "studies": _grid(map(_study, SMALL_STUDIES)),
+    }
+
+
+def _grid(entries: Iterable[str]) -> str:
+    return "\n\n".join(['<div class="gallery" markdown>', *entries, "</div>"])
 
 
 def seen(study: Study, figure: str) -> str:
@@ -499,16 +525,39 @@ def seen(study: Study, figure: str) -> str:
     return text + only
 
 
+def _entry(alternative: str, file: str, *lines: str) -> str:
+    """Entry of the gallery: a small picture that leads to the whole one, and lines below it."""
+    picture = f"[![{alternative}]({PICTURES}/{SMALL}/{file})]({PICTURES}/{file})"
+    return "\n\n    ".join([f"- {picture}", *lines])
+
+
 def _scenario(scenario: Scenario) -> str:
-    name, file = scenario.name, f"{PICTURES}/{scenario.name}.png"
-    shown = f"[![{_SEEN[FLEET if scenario.vehicles else scenario.figure]}]({file})]({file})"
-    return f"{shown}<br>**{scenario.title}**<br>`auv-fmu run {name}` <!-- live: {name} -->"
-
-
-def _place(scenario: Scenario) -> tuple[bool, bool, str]:
-    """Sort key: the paper's scenarios first, and among these the open loops last."""
     name = scenario.name
-    return not name.startswith("fig"), name.startswith("fig3"), name
+    return _entry(
+        _SEEN[FLEET if scenario.vehicles else scenario.figure],
+        f"{name}.png",
+        f"**{scenario.title.removesuffix(_BOTH)}**",
+        f"`auv-fmu run {name}`",
+        f"<!-- live: {name} -->",
+    )
+
+
+def _study(name: str) -> str:
+    study, figure = read_study(name), SMALL_STUDIES[name]
+    heading = re.sub(r"[^\w -]", "", study.title.lower()).replace(" ", "-")
+    return _entry(
+        seen(study, figure),
+        f"studies/{name}-{figure}.png",
+        f"**{study.title}**",
+        f"`auv-fmu sweep {name}`",
+        f"[All its figures](explanation/ready-studies.md#{heading})",
+    )
+
+
+def _place(scenario: Scenario) -> tuple[int, str]:
+    """Sort key: the best first."""
+    name = scenario.name
+    return _BEST.index(name) if name in _BEST else len(_BEST), name
 
 
 def main() -> None:

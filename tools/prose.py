@@ -63,7 +63,7 @@ _MARKDOWN = MarkdownIt("commonmark").enable("table")
 
 #: Ends of sentences, the end of an item that is one, and abbreviations with a full stop.
 _END = re.compile(
-    r"""[.!?]["')\]]*\s+(?=["'(\[]*(?:[A-Z0-9`§λγστε]|ecos|fmpy|libcosim|pip|theta_hat))"""
+    r"""[.!?]["')\]]*\s+(?=["'(\[$]*(?:[A-Z0-9`§λγστε]|ecos|fmpy|libcosim|pip|theta_hat))"""
 )
 _SENTENCE = re.compile(r"""[.!?:]["')\]]*$""")
 _ABBREVIATION = re.compile(

@@ -16,6 +16,7 @@ import re
 from base64 import b64decode
 from collections.abc import Callable
 from html import escape
+from itertools import cycle
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -28,6 +29,7 @@ from nbclient import NotebookClient
 from fmus.discovery import components
 from orchestrator.live import presets
 from orchestrator.machine.errors import InputError
+from orchestrator.machine.mathematics import typeset
 
 ROOT = Path(__file__).parents[1]
 
@@ -45,20 +47,39 @@ PAGES = {
 
 LIVE = "live.html"
 
-#: Weights of pages in the search, by the beginning of their place.
+#: Weights of pages in the search, by the beginning of their place; the first that fits.
 BOOSTS = {
+    # These name every guide.
+    "index.md": 0.3,
+    "how-to/README.md": 0.3,
+    "explanation/README.md": 0.3,
     "tutorials/": 2.0,
     "how-to/": 2.0,
     "explanation/kinds.md": 2.0,
+    "explanation/component.md": 2.0,
+    "contributing/testing.md": 0.5,
     "contributing/": 0.2,
     "explanation/architecture.md": 0.5,
     "reference/fmi-answers.md": 0.5,
     "reference/promises.md": 0.5,
 }
 
+#: Pages that need the width of the window, and the parts left out for it.
+WIDE = {
+    "index.md": ["navigation", "toc"],
+    "gallery.md": ["toc"],
+    "how-to/README.md": ["navigation"],
+}
+
 _LINK = re.compile(r"(?<!!)\[((?:[^][]|\[[^][]*\])*)\]\(([^)#\s]*)(#[^)\s]*)?\)")
 _PRESET = re.compile(r"<!-- live: (([\w-]+)\S*) -->")
 _ROW, _CODE = re.compile(r"^\|.*$", re.MULTILINE), re.compile(r"`[^`]+`")
+_TABLE = re.compile(r"(<table[^>]*>\s*<thead>.*?</thead>)(.*?</table>)", re.DOTALL)
+_CELL = re.compile(r"<th\b[^>]*>(.*?)</th>", re.DOTALL)
+_LONG_CODE = re.compile(r"(?<=<code>)[^<]{40,}(?=</code>)")
+_BREAK = re.compile(r"(?<=[/:,+|_ ])(?=\w)")
+_DATA = re.compile(r"<t[dh](?=[ >])")
+_DISPLAYED = '<div class="math"'
 _ROLE = re.compile(r":(class|data|func|mod):(?=<code>)")
 
 log = logging.getLogger(f"mkdocs.hooks.{__name__}")
@@ -90,26 +111,38 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Point links to the site's pages and to the live page."""
     place = page.file.src_uri
-    [boost] = [n for beginning, n in BOOSTS.items() if place.startswith(beginning)] or [1.0]
-    page.meta["search"] = {"boost": boost}
-    if place == "index.md":
-        # The home page has no neighbours in the navigation.
-        page.meta["hide"] = ["navigation"]
+    boosts = (n for beginning, n in BOOSTS.items() if place.startswith(beginning))
+    page.meta["search"] = {"boost": next(boosts, 1.0)}
+    page.meta["hide"] = WIDE.get(place, [])
     markdown = linked(markdown, place, files)
     up = posixpath.relpath(LIVE, posixpath.dirname(place) or ".")
     if _why_not:
         note = f"This site was built without it: {_why_not}."
     else:
-        note = f'<iframe class="live" src="{up}" title="The live page" loading="lazy"></iframe>'
+        note = f'<iframe class="live" src="{up}" title="The live page"></iframe>'
     markdown = markdown.replace("<!-- the live page -->", note)
     markdown = _ROW.sub(_with_plain_bars, markdown)
-    link = "" if _why_not else rf"[`\2` on the live page]({up}#preset=\1)"
+    link = "" if _why_not else rf"[Run `\2` live]({up}#preset=\1)"
     return _PRESET.sub(link, markdown)
 
 
 def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Remove the roles of names in docstrings."""
-    return _ROLE.sub("", content)
+    """Typeset mathematics, remove roles, name columns in cells of tables, let long code break."""
+    content = typeset(content).replace(_DISPLAYED, f"{_DISPLAYED} data-search-exclude")
+    content = _TABLE.sub(_with_columns, _ROLE.sub("", content))
+    return _LONG_CODE.sub(lambda code: _BREAK.sub("<wbr>", code[0]), content)
+
+
+def on_post_page(output: str, page: Page, config: MkDocsConfig) -> str:
+    """Name the search for screen readers, which the theme does not."""
+    return output.replace('role="dialog"', 'role="dialog" aria-label="Search"', 1)
+
+
+def _with_columns(table: re.Match[str]) -> str:
+    """Table whose cells name their column, for windows in which each row is a card."""
+    head, body = table.groups()
+    columns = cycle(re.sub("<[^>]+>", "", cell) for cell in _CELL.findall(head))
+    return head + _DATA.sub(lambda cell: f'{cell[0]} data-column="{next(columns)}"', body)
 
 
 def _with_plain_bars(row: re.Match[str]) -> str:

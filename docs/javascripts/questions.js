@@ -13,7 +13,9 @@
   const QUERY = 2;
 
   const kept = (question) => {
-    const words = question.replace(/[?!]/g, " ").split(/\s+/).filter(Boolean);
+    // The search leaves out a word behind a dash, and splits names at underscores only in pages.
+    const parts = question.replace(/[?!]|(?<!\w)-+|(?<=\w\w)_(?=\w\w)/g, " ");
+    const words = parts.split(/\s+/).filter(Boolean);
     const telling = words.filter((word) => !LEFT_OUT.has(word.toLowerCase()));
     const asked = telling.length > 0 ? telling : words;
     return asked.map((word) => word.replace(/(?<=\w\w[^s\W])s$/, "")).join(" ");

@@ -24,6 +24,7 @@ from orchestrator.machine.identity import package_folder
 from orchestrator.program.components import definitions_of
 from orchestrator.program.writer import EXPORTED, Equations, Text, Unsupported
 from orchestrator.runs.preparation import Prepared
+from orchestrator.vehicle.cautions import KNOWN_BEFORE, WATCHED
 from orchestrator.vehicle.indices import metrics
 
 #: Category in the cache.
@@ -52,8 +53,8 @@ _SHARED = ("-DAPART=",)
 _LINKED = ("-mexec-model=reactor", "-O2", "-s", "-Wl,--gc-sections")
 _FREE = "__heap_base"
 
-#: Reducers of all indices.
-REDUCERS = tuple(dict.fromkeys(index.reducer for index in metrics()))
+#: Reducers of all indices, and of warnings.
+REDUCERS = tuple(dict.fromkeys((*(i.reducer for i in metrics()), KNOWN_BEFORE, *WATCHED)))
 
 
 class Source(NamedTuple):

@@ -37,6 +37,8 @@ from orchestrator.runs.scenario import (
     shared_events,
 )
 from orchestrator.runs.scenario_file import AT_ONCE
+from orchestrator.vehicle.cautions import RULES, Rule
+from orchestrator.vehicle.indices import metrics
 from orchestrator.vehicle.signals import STANDARD, AllocatedLoop, Loop, loops_of
 
 
@@ -60,6 +62,8 @@ _CONTROLLERS = {
     "ObserverController": _Controller("proposed", "PdController", measures_velocity=False),
     "PdController": _Controller("PD", "ObserverController", measures_velocity=True),
 }
+
+_INDICES = {index.reducer for index in metrics()}
 
 #: Most steps, of all vehicles together: the page keeps all rows of a run in memory.
 _MOST_STEPS = 200_000
@@ -115,8 +119,15 @@ def page_data(opened: str) -> tuple[Plain, Sequence[Programs]]:
         "mostSteps": _MOST_STEPS,
         "presets": presets,
         "measured": measured,
+        "rules": [_rule(rule) for rule in RULES],
     }
     return data, modules
+
+
+def _rule(rule: Rule) -> Plain:
+    """Return a rule for a warning; JSON has no infinity."""
+    above = max(rule.above, -sys.float_info.max)
+    return {"number": rule.number, "above": above, "text": rule.text}
 
 
 @cache
@@ -296,6 +307,7 @@ def _measured(text: Text, loop: Loop) -> list[Plain]:
     return [
         {
             "name": reducer.name,
+            "isIndex": reducer in _INDICES,
             "takes": [
                 # JSON has no infinity.
                 str(source) if isinstance(source, PortName) else min(source, sys.float_info.max)

@@ -16,7 +16,7 @@ from orchestrator.vehicle.indices import SMALLEST_DISTANCE, VEHICLES, metrics
 from orchestrator.vehicle.signals import Loop, real_parameter
 
 #: Most numbers in a page, of all runs together; rows of longer runs are skipped.
-_NUMBERS = 800_000
+_NUMBERS = 400_000
 
 #: Share of its values below which a column's range needs doubles.
 _NARROW = 1e-3
@@ -82,7 +82,7 @@ def view_page(
         units = {k: v for each, _ in pairs for k, v in each.run.result.header.units.items()}
         shown = dict.fromkeys(chain.from_iterable(names))
         data["columns"] = {name: printed_unit(str(units.get(name, ""))) for name in shown}
-    notes = [*(_drawn(stored[0].run) if n else ()), *_endings([each.run for each in stored])]
+    notes = [*(_left_out(stored[0].run) if n else ()), *_endings([each.run for each in stored])]
     text = "".join(f"{note}. " for note in notes)
     return assemble("view", data, binary, {"title": title, "notes": text}, hear)
 
@@ -95,9 +95,8 @@ def _vehicles(run: Drawn) -> list[Loop]:
     return loops
 
 
-def _drawn(run: Drawn) -> Iterator[str]:
-    """Yield notes on the size of the drawn vehicles and on parts that are left out."""
-    yield "Vehicles are drawn larger than they are"
+def _left_out(run: Drawn) -> Iterator[str]:
+    """Yield notes on parts that are left out."""
     for loop in run.loops:
         of_vehicle = f"{loop.name}: " if len(run.loops) > 1 else ""
         for name, needs in _SHOWN.items():

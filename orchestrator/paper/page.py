@@ -19,6 +19,7 @@ from markdown_it.token import Token
 
 from auv_fmu.language.quantities import TAU
 from orchestrator.figures.style import printed_unit
+from orchestrator.machine.mathematics import typeset
 
 _TEMPLATE = Path(__file__).with_name("report.html")
 
@@ -116,7 +117,7 @@ def html(text: str, folder: Path) -> str:
     tokens = _MARKDOWN.parse(text)
     [title, *_] = _headings(tokens)
     _embed_pictures(tokens, folder)
-    body = _MARKDOWN.renderer.render(tokens, _MARKDOWN.options, {})
+    body = typeset(_MARKDOWN.renderer.render(tokens, _MARKDOWN.options, {}))
     return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(title=title.title, body=body)
 
 

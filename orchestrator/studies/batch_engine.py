@@ -248,7 +248,7 @@ class _Programs:
         every = cautions(value, point.step, self.loops)
         for loop, places in zip(self.loops, compiled.watched, strict=True):
             seen = {name: numbers[i] for name, i in places.items() if not isnan(numbers[i])}
-            every += cautions_seen(seen, loop, value, point.step)
+            every += cautions_seen(seen, loop, value)
         return kinds_of(every)
 
     def value(self, point: Point, name: str) -> Value | None:

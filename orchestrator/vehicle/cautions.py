@@ -5,19 +5,19 @@ Among the former: velocities that reach a controller which is meant to work with
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
-from math import inf
+from math import inf, nan
 from typing import NamedTuple
 
 import numpy as np
 
-from auv_fmu.paper.observer import Form, exact_gain
-from auv_fmu.paper.vehicle import Vehicle
-from auv_fmu.proof.gain_conditions import bounds, observer_rate, robust_rate
+from auv_fmu.paper.observer import Form
 from fmus.ports.reducer import read_reducer
 from orchestrator.cosim import Ending, Header, PortName, System, Table, Value
-from orchestrator.vehicle.index import largest_bound, vertical_passed
+from orchestrator.vehicle.index import observer_step, robust_step, vertical_passed
+from orchestrator.vehicle.index.observer_step import Inputs
 from orchestrator.vehicle.reduction import reductions_of
 from orchestrator.vehicle.signals import (
     STANDARD,
@@ -49,6 +49,56 @@ CAUTIONS = {
 }
 
 
+class Rule(NamedTuple):
+    """A rule for a warning.
+
+    Attributes:
+        kind: one of :data:`CAUTIONS`.
+        number: result of one of :data:`WATCHED`.
+        above: value above which it warns.
+        text: the warning: `{name}` is the name of a parameter in the loop, and `{name:g}` its
+            value, or another result of the same reducer.
+
+    """
+
+    kind: str
+    number: str
+    above: float
+    text: str
+
+
+RULES = (
+    Rule(
+        UNSTABLE,
+        "observer_step",
+        _GROWS,
+        "{controller.k_d} = {controller.k_d:g} 1/s is unstable with internal steps of "
+        "{internal_step:g} s: the observer's fastest mode has h p = {observer_step:.3g} and grows "
+        f"above {_GROWS:g}; lower k_d or h_max",
+    ),
+    Rule(
+        CHATTERING,
+        "robust_step",
+        _REVERSES,
+        "the robust term chatters: its step gain h p is {robust_step:.3g}, and above "
+        f"{_REVERSES:g} its sign changes in every step "
+        "(theta_hat[1] reaches {largest_bound:.3g} N, {controller.eps_t} = {controller.eps_t:g} W)"
+        "; raise eps_t or reduce the step",
+    ),
+    Rule(
+        VERTICAL,
+        "vertical_passed",
+        -inf,
+        "the pitch passes 90 degrees by t = {vertical_passed:g} s, where (1) has a pole: with "
+        "{plant.roll} = false what follows depends on rounding, so quote no single run; compare "
+        "runs whose {plant.eta0} differs by 1e-6 m, or set {plant.roll} = true",
+    ),
+)
+
+#: A field in the text of a rule: a name, and the digits of its value.
+_FIELD = re.compile(r"\{([\w.]+)(:\.?\d*g)?\}")
+
+
 class Caution(NamedTuple):
     """A warning about a run.
 
@@ -72,30 +122,44 @@ def values_of(system: System) -> ValueOf:
     return value
 
 
+def observer_of(value: ValueOf, controller: str = STANDARD.controller) -> Inputs | None:
+    """Return the parameters of a controller's observer, or None."""
+    numbers = [value(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
+    if None in numbers:
+        return None
+    form = Form.EXACT if value(f"{controller}.observer") in ("exact", Form.EXACT) else Form.EULER
+    k_d, lambda_, h_max = (float(number or 0.0) for number in numbers)
+    return Inputs(k_d, lambda_, h_max, form)
+
+
 def gain_of_a_step(value: ValueOf, h: float, controller: str = STANDARD.controller) -> float:
-    """Return k_d as used in a step of h seconds [1/s]: the form of the observer may change it."""
-    k_d = float(value(f"{controller}.k_d") or 0.0)
-    return exact_gain(k_d, h) if value(f"{controller}.observer") in ("exact", Form.EXACT) else k_d
+    """Return k_d as used in a step of h seconds [1/s]; 0: there is no observer."""
+    observer = observer_of(value, controller)
+    return observer_step.gain_of(observer, h) if observer else 0.0
 
 
 def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution]:
     """Return the warnings before a run with steps of a length [s]."""
-    unstable = []
-    for controller in dict.fromkeys(loop.controller for loop in loops):
-        values = [value(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
-        if None in values:
-            continue
-        k_d, lambda_, h_max = (float(number or 0.0) for number in values)
-        h = min(step, h_max)
-        h_p = h * observer_rate(lambda_, gain_of_a_step(value, h, controller))
-        if h_p > _GROWS:
-            text = (
-                f"{controller}.k_d = {k_d:g} 1/s is unstable with internal steps of {h:g} s: the "
-                f"observer's fastest mode has h p = {h_p:.3g} and grows above {_GROWS:g}; lower "
-                "k_d or h_max"
-            )
-            unstable.append(Caution(UNSTABLE, text))
-    return unstable
+    found: list[Caution] = []
+    for loop in {loop.controller: loop for loop in loops}.values():
+        if (observer := observer_of(value, loop.controller)) is not None:
+            found += _warnings(observer_step.of_step(observer, step)._asdict(), loop, value)
+    return found
+
+
+def _warnings(numbers: Mapping[str, float], loop: Loop, value: ValueOf) -> Iterator[Caution]:
+    """Yield the warnings of the rules whose numbers are given."""
+
+    def written(field: re.Match[str]) -> str:
+        name, digits = field.groups()
+        if not digits:
+            return loop.port(name)
+        number = numbers[name] if name in numbers else value(loop.port(name))
+        return format(float(number or 0.0), digits[1:])
+
+    for rule in RULES:
+        if numbers.get(rule.number, nan) > rule.above:
+            yield Caution(rule.kind, _FIELD.sub(written, rule.text))
 
 
 def differing_vehicle(system: System) -> str | None:
@@ -138,8 +202,9 @@ def _real_parameter(system: System, name: PortName) -> float | None:
     return None if value is None else float(value)
 
 
-#: Reducers from whose results warnings follow.
-WATCHED = (read_reducer(largest_bound), read_reducer(vertical_passed))
+#: Reducers from whose results warnings follow: before a run, and from its rows.
+KNOWN_BEFORE = read_reducer(observer_step)
+WATCHED = (read_reducer(robust_step), read_reducer(vertical_passed))
 
 
 class Watch:
@@ -166,7 +231,6 @@ class Watch:
     def found(self) -> list[Caution]:
         """Return the warnings that follow from the rows."""
         table = Table.of(self._header, np.empty((0, 1 + len(self._header.columns))))
-        step = self._header.experiment.step
         return [
             caution
             for loop, reductions in self._reductions.items()
@@ -178,38 +242,13 @@ class Watch:
                 },
                 loop,
                 partial(value_of, table),
-                step,
             )
         ]
 
 
-def cautions_seen(
-    seen: Mapping[str, float], loop: Loop, value: ValueOf, step: float
-) -> Iterator[Caution]:
+def cautions_seen(seen: Mapping[str, float], loop: Loop, value: ValueOf) -> Iterator[Caution]:
     """Yield the warnings that follow from the results of :data:`WATCHED` for a loop."""
-    rho_hat, vertical = seen.get("largest_bound", -inf), seen.get("vertical_passed", inf)
-    roll, eps = f"{loop.vehicle}.roll", f"{loop.controller}.eps_t"
-    needed = (eps, loop.ell, f"{loop.controller}.h_max", *loop.vehicle_parameters)
-    known = map(value, needed) if rho_hat > 0.0 else ()
-    numbers = [float(number) for number in known if isinstance(number, int | float)]
-    if len(numbers) == len(needed) and min(numbers[:2]) > 0.0:
-        eps_t, ell, h_max, *plant = numbers
-        lambda_m2 = bounds(Vehicle._make(plant), ell).lambda_m2
-        h_p = min(step, h_max) * robust_rate(rho_hat, eps_t, lambda_m2)
-        if h_p > _REVERSES:
-            text = (
-                f"the robust term chatters: with theta_hat[1] up to {rho_hat:.3g} N and {eps} "
-                f"= {eps_t:g} W its step gain h p is {h_p:.3g}, and above {_REVERSES:g} its sign "
-                "changes in every step; raise eps_t or reduce --step"
-            )
-            yield Caution(CHATTERING, text)
-    if vertical < inf and value(roll) is False:
-        text = (
-            f"the pitch passes 90 degrees by t = {vertical:g} s, where (1) has a pole: with "
-            f"{roll} = false what follows depends on rounding, so quote no single run; compare "
-            f"runs whose {loop.vehicle}.eta0 differs by 1e-6 m, or set {roll} = true"
-        )
-        yield Caution(VERTICAL, text)
+    return _warnings(seen, loop, value)
 
 
 def cautions_beside(

@@ -13,6 +13,7 @@ from markdown_it import MarkdownIt
 
 from auv_fmu import __version__
 from orchestrator.commands.main import main, parser
+from orchestrator.machine.mathematics import typeset
 from support.markdown import DOCS, blocks
 
 ROOT = DOCS.parent
@@ -67,6 +68,26 @@ def test_code_is_fenced_and_names_its_language(page: Path):
     tokens = MarkdownIt("commonmark").parse(page.read_text(encoding="utf-8"))
     code = [token for token in tokens if token.type in ("code_block", "fence")]
     assert all(token.info for token in code)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_mathematics_is_typeset(page: Path):
+    """A line that begins with a mark is HTML, in which Markdown and mathematics are not read."""
+    text = page.read_text(encoding="utf-8")
+    markdown = MarkdownIt("commonmark").enable("table")
+    marked = [token.content for token in markdown.parse(text) if token.type == "html_block"]
+    assert not re.search(r"`|\$", "".join(marked))
+    assert typeset(markdown.render(text)).count("<math") == len(
+        re.findall(r"\$`|^```math", text, re.M)
+    )
+
+
+@pytest.mark.parametrize(
+    "page", sorted(ROOT.glob("fmus/*/page.md")), ids=lambda page: page.parent.name
+)
+def test_page_of_a_component_begins_with_its_purpose_and_its_ports(page: Path):
+    text = page.read_text(encoding="utf-8")
+    assert re.match(r"# \w+\n\n([^\n]+\n){1,3}\n<!-- filled: ports -->\n", text)
 
 
 def test_packages_say_that_they_are_typed():

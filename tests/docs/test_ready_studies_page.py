@@ -13,7 +13,7 @@ from orchestrator.runs.scenario import names
 from orchestrator.studies.study import read_study, ready_studies
 from orchestrator.vehicle.indices import index_columns
 from orchestrator.vehicle.signals import loops_of
-from pages import PICTURES
+from pages import PICTURES, SMALL, SMALL_STUDIES
 from support.markdown import DOCS
 
 PAGE = DOCS / "explanation" / "ready-studies.md"
@@ -33,6 +33,14 @@ def test_every_scenario_has_a_picture_and_nothing_else_has():
     files = [*(DOCS / PICTURES).glob("*.*")]
     assert {file.name for file in files} == {f"{name}.png" for name in names()}
     assert all(file.stat().st_size < 150_000 for file in files)
+
+
+def test_gallery_has_a_small_picture_of_every_scenario_and_study():
+    small = DOCS / PICTURES / SMALL
+    files = {file.relative_to(small).as_posix() for file in small.rglob("*.*")}
+    of_studies = {f"studies/{name}-{SMALL_STUDIES[name]}.png" for name in ready_studies()}
+    assert files == of_studies | {f"{name}.png" for name in names()}
+    assert all((small / file).stat().st_size < 80_000 for file in files)
 
 
 @pytest.mark.parametrize("name", ready_studies())

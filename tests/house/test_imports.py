@@ -38,9 +38,10 @@ ALLOWED = {
     "fmus": {"auv_fmu", "markdown_it", "orchestrator", "pythonfmu"},
     "orchestrator": {
         "auv_fmu", "builtin_interfaces", "dask", "distributed", "filelock", "fmpy", "fmus",
-        "geometry_msgs", "gymnasium", "libcosimpy", "lxml", "markdown_it", "matplotlib",
-        "mpl_toolkits", "nav_msgs", "numpy", "onnx", "pandas", "pettingzoo", "PIL", "platformdirs",
-        "pyarrow", "pydantic", "pydantic_core", "rclpy", "rosgraph_msgs", "scipy", "tqdm",
+        "geometry_msgs", "gymnasium", "libcosimpy", "lxml", "markdown_it", "math_core",
+        "matplotlib", "mpl_toolkits", "nav_msgs", "numpy", "onnx", "pandas", "pettingzoo", "PIL",
+        "platformdirs", "pyarrow", "pydantic", "pydantic_core", "rclpy", "rosgraph_msgs", "scipy",
+        "tqdm",
     },
 }  # fmt: skip
 

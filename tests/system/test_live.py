@@ -18,6 +18,7 @@ import pytest
 from fmus.kinds import NATIVE
 from orchestrator.commands.main import main
 from orchestrator.cosim import Ending, Table
+from orchestrator.figures import visible
 from orchestrator.live import assembly, module, presets
 from orchestrator.live.assembly import ENGINE
 from orchestrator.live.module import live_module
@@ -128,11 +129,16 @@ def test_rows_events_and_indices_are_the_ones_of_the_native_fmus(name: str, part
         assert tuple(outcome["messages"]) == ending.messages
         assert outcome.get("failure") == ending.failure
         wanted = table.rows[:, places(table)]
-        found = np.fromfile(tmp_path / f"{name}.{i}").reshape(wanted.shape)
+        found = rows_in(tmp_path / f"{name}.{i}", wanted)
         compared = table.time <= CHAOTIC.get(run.scenario.name, np.inf)
         difference = np.abs(found - wanted) / np.maximum(1.0, np.abs(wanted))
         assert difference[compared].max() <= LARGER.get(run.scenario.name, TOLERANCE)
         compare_indices(run, table, found, outcome, OF_SINES)
+
+
+def rows_in(file: Path, like: np.ndarray) -> np.ndarray:
+    """The rows in a file of columns."""
+    return np.ascontiguousarray(np.fromfile(file).reshape(like.shape[::-1]).T)
 
 
 def compiled(run: Prepared) -> Prepared:
@@ -197,7 +203,7 @@ def test_only_the_c_library_makes_rows_differ(parts: Parts, tmp_path, monkeypatc
             table, outcome = Table(), outcomes[f"{name}.{i}"]
             ending = run.run([table])
             wanted = table.rows[:, places(table)]
-            found = np.fromfile(tmp_path / f"{name}.{i}").reshape(wanted.shape)
+            found = rows_in(tmp_path / f"{name}.{i}", wanted)
             assert found.tobytes() == wanted.tobytes(), (name, i)
             assert outcome.get("failure") == ending.failure
             compare_indices(run, table, found, outcome, ())
@@ -255,7 +261,7 @@ def compare(run: Prepared, outcome: Any, folder: Path) -> tuple[Ending, Table]:
     table = Table()
     ending = run.run([table])
     wanted = table.rows[:, places(table)]
-    found = np.fromfile(folder / "mine.0").reshape(wanted.shape)
+    found = rows_in(folder / "mine.0", wanted)
     assert found == pytest.approx(wanted, rel=TOLERANCE, abs=TOLERANCE)
     compare_indices(run, table, found, outcome, OF_SINES)
     return ending, table
@@ -267,6 +273,36 @@ def test_a_state_that_a_guard_starts_over_is_told(parts: Parts, tmp_path):
     outcome, run = both(gate, parts, tmp_path)
     [message] = run.run([]).messages
     assert outcome["messages"] == [message]
+
+
+def test_cautions_are_the_warnings_of_a_run(parts: Parts, tmp_path, capsys):
+    """About the observer, the robust term and the vertical, each of its vehicle."""
+    text = "vehicles = 2\nstop_time = 12.0\n[parameters]\nauv2.plant.eta0.x = 9.0\n"
+    text += "auv1.controller.k_d = 150.0\nauv2.controller.eps_t = 1e-3\n"
+    text += "auv2.plant.roll = false\nauv2.plant.eta0.theta = 1.5\nauv2.plant.nu0.q = 1.0\n"
+    outcome, _ = both(text, parts, tmp_path)
+    capsys.readouterr()
+    main(["run", str(tmp_path / "mine.toml"), "--no-figures", "--out", str(tmp_path / "out")])
+    warnings = re.findall(r"warning: mine: (.*)", capsys.readouterr().err)
+    assert {*outcome["cautions"]} <= {*warnings}
+    words = ("auv1.controller.k_d = 150 1/s is unstable", "auv2.controller.eps_t = 0.001 W")
+    for word in (*words, "auv2.plant.roll = false"):
+        assert sum(word in line for line in outcome["cautions"]) == 1, word
+
+
+def test_signals_chatter_in_charts_as_in_figures(parts: Parts):
+    """And have the same means: noise, noise with a trend, a step, and a slow wave."""
+    random = np.random.default_rng(5)
+    time = np.concatenate((0.02 * np.arange(900), 18.0 + 0.05 * np.arange(300)))
+    noise = random.normal(size=len(time))
+    signals = [noise, 3.0 * time + noise, 1e-5 * noise + (time > 9.0), np.sin(time)]
+    given = json.dumps([row.tolist() for row in (time, *signals)])
+    found = parts.node("chatter.mjs", given=given)
+    for signal, (is_chatter, mean) in zip(signals, found, strict=True):
+        assert is_chatter == visible.chatters(signal)
+        wanted = visible.moving_mean(time, signal, visible.mean_window(time))
+        np.testing.assert_allclose(mean, wanted, rtol=0.0, atol=1e-9)
+    assert [is_chatter for is_chatter, _ in found] == [True, True, False, False]
 
 
 def test_systems_of_a_users_own_run_in_the_page(parts: Parts, tmp_path):
@@ -315,8 +351,8 @@ def test_tables_are_the_same_in_node_and_in_a_browser(parts: Parts, opened: Brow
         }})()""")
         assert digest == expected["digest"], changes
     assert opened.said == []
-    # The page itself, and nothing else.
-    assert [address.split(":")[0] for address in opened.requests] == ["file"]
+    # The page and its worker, and nothing else.
+    assert {address.split(":")[0] for address in opened.requests} <= {"file", "blob"}
 
 
 def test_refusal_is_the_line_of_the_fmu_and_changes_nothing(parts: Parts):

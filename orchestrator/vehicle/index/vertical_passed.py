@@ -1,4 +1,4 @@
-"""Time at which the pitch passes 90 degrees, where (1) has a pole."""
+"""Time at which the pitch passes 90 degrees, where (1) without roll has a pole."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ _UPRIGHT = 1.5
 
 
 class Inputs(NamedTuple):
-    """The pitch."""
+    """The pitch, and whether the vehicle rolls."""
 
     pitch: Annotated[float, Variable("rad", "Pitch", name="plant.eta.theta")]
+    roll: Annotated[bool, Variable(description="Rolls or not", name="plant.roll")]
 
 
 class State(NamedTuple):
@@ -38,7 +39,7 @@ def start(inputs: Inputs, t: float) -> State:
 def update(state: State, inputs: Inputs, t: float) -> State:
     """Add a row."""
     cosine = cos(inputs.pitch) if abs(inputs.pitch) > _UPRIGHT else 1.0
-    if isnan(state.passed) and cosine * state.upright <= 0.0:
+    if not inputs.roll and isnan(state.passed) and cosine * state.upright <= 0.0:
         return State(state.upright, t)
     return state
 

@@ -125,6 +125,18 @@ class Condition(NamedTuple):
         return "open" if self.zetas else "met"
 
 
+def least_inertia(m11: float, m55: float, m66: float, ell: float) -> float:
+    """Smallest eigenvalue of M_2 [kg].
+
+    Args:
+        m11: surge mass [kg].
+        m55, m66: pitch and yaw inertia [kg.m2].
+        ell: distance of the control point [m].
+
+    """
+    return min(m11, min(m55, m66) / ell**2)
+
+
 def bounds(vehicle: Vehicle, ell: float) -> Bounds:
     """Extreme eigenvalues of M_2 and D_2.
 
@@ -133,9 +145,14 @@ def bounds(vehicle: Vehicle, ell: float) -> Bounds:
         ell: distance of the control point [m].
 
     """
-    inertia = (vehicle.m11, vehicle.m55 / ell**2, vehicle.m66 / ell**2)
+    m11, m55, m66 = vehicle.m11, vehicle.m55, vehicle.m66
     damping = (vehicle.d11, vehicle.d55 / ell**2, vehicle.d66 / ell**2)
-    return Bounds(min(inertia), max(inertia), min(damping), max(damping))
+    return Bounds(
+        least_inertia(m11, m55, m66, ell),
+        max(m11, m55 / ell**2, m66 / ell**2),
+        min(damping),
+        max(damping),
+    )
 
 
 def conditions(

@@ -1,6 +1,7 @@
 // Charts: one small uPlot for each signal, with a common cursor.
 
 import uPlot from "uplot";
+import { chatters, extremes, movingMean } from "./chatter";
 import { make, numberField } from "./dom";
 import { swatch } from "./legend";
 import type { Lines, Panel, Section, Style } from "./panels";
@@ -18,10 +19,19 @@ const HEIGHT = 132;
 const TIME_AXIS = 22;
 const VALUE_AXIS = 46;
 
+/** Room above a plot for the names of events. */
+const ABOVE = 22;
+
+/** Gap between printed charts [px]. */
+const GAP = 12;
+
+/** Opacity of the band of a signal that chatters. */
+const BAND = 0.3;
+
 const DASHES: Record<Style, number[]> = {
   first: [],
   second: [6, 3],
-  reference: [4, 4],
+  true: [4, 4],
   "first-of-all": [],
   "second-of-all": [6, 3],
 };
@@ -33,7 +43,7 @@ const NEAR = 0.5;
 const PROPERTIES: Record<Style, string> = {
   first: "--first",
   second: "--second",
-  reference: "--reference",
+  true: "--reference",
   "first-of-all": "--reference",
   "second-of-all": "--reference",
 };
@@ -46,10 +56,15 @@ class Chart {
   readonly root: HTMLElement;
   readonly #panel: Panel;
   readonly #values: readonly HTMLElement[];
+  readonly #caption: string;
+  readonly #host: HTMLElement;
   readonly #plot: uPlot;
   #lines: Lines = { time: new Float64Array(0), values: [] };
   #marks: readonly Mark[] = [];
+  /** True if there is room above for the names of events. */
   #named = false;
+  /** Lines that chatter; undefined: others. */
+  #bands: readonly (Float64Array | undefined)[] = [];
   #stale = false;
   #visible = false;
   #time = 0;
@@ -66,10 +81,11 @@ class Chart {
     readout.setAttribute("aria-hidden", "true");
     const caption = document.createElement("figcaption");
     caption.innerHTML = `<span class="name">${panel.title} <span class="unit">${panel.unit && `[${panel.unit}]`}</span></span>`;
+    this.#caption = caption.textContent ?? "";
     caption.append(readout);
     const host = make("div", "plot");
     host.setAttribute("role", "img");
-    host.setAttribute("aria-label", `${caption.textContent} over time: ${panel.names.join(", ")}`);
+    this.#host = host;
     this.root = make("figure", "chart pending", caption, host);
     this.#plot = new uPlot(this.#options(), [new Float64Array(0)], host);
     const point = (event: PointerEvent) => {
@@ -78,16 +94,12 @@ class Chart {
     };
     this.#plot.over.addEventListener("pointermove", point);
     this.#plot.over.addEventListener("pointerdown", point);
-    new ResizeObserver(([{ contentRect }]) => {
-      const width = Math.floor(contentRect.width);
-      if (width > 0 && width !== this.#plot.width) this.#plot.setSize({ width, height: HEIGHT });
-    }).observe(host);
+    new ResizeObserver(() => this.fit()).observe(host);
     new IntersectionObserver(
       ([{ isIntersecting }]) => {
         this.#visible = isIntersecting;
         if (!isIntersecting || this.root.hidden) return;
-        if (this.#stale) this.#redraw();
-        else this.#point();
+        if (!this.refresh()) this.#point();
       },
       { rootMargin: "60px" },
     ).observe(this.root);
@@ -107,7 +119,7 @@ class Chart {
     return {
       width: 280,
       height: HEIGHT,
-      padding: [8, 13, 0, 0],
+      padding: [() => (this.#named && this.#marks.length ? ABOVE : 8), 13, 0, 0],
       legend: { show: false },
       cursor: {
         y: false,
@@ -147,11 +159,19 @@ class Chart {
 
   /** Returns the range of times, from the chosen beginning if the run lasts longer. */
   #times(low: number, high: number): [number, number] {
-    return [this.#from < high ? Math.max(low, this.#from) : low, high];
+    const end = Math.max(high, this.#lines.until ?? high);
+    return [this.#from < end ? Math.max(low, this.#from) : low, end];
   }
 
   /** Returns the range of values, with limits that they come near to. */
   #range(low: number, high: number): [number, number] {
+    const { time } = this.#lines;
+    const row = rowAt(time, this.#times(time[0], time[time.length - 1])[0]);
+    for (const band of this.#bands) {
+      const [least, largest] = extremes(band?.subarray(row) ?? new Float64Array(0));
+      low = Math.min(low, least);
+      high = Math.max(high, largest);
+    }
     for (const limit of this.#lines.limits ?? []) {
       if (Math.max(high, -low) > NEAR * Math.abs(limit)) {
         low = Math.min(low, limit);
@@ -171,7 +191,26 @@ class Chart {
     for (const { from, until } of this.#marks) {
       ctx.fillRect(at(from), bbox.top, Math.max(1, at(until) - at(from)), bbox.height);
     }
+    ctx.globalAlpha = BAND;
+    this.#bands.forEach((band, k) => {
+      ctx.fillStyle = property(PROPERTIES[this.#panel.styles[k]]);
+      if (band) this.#drawBand(band);
+    });
     ctx.restore();
+  }
+
+  /** Draws the range of a line's values in each column of pixels. */
+  #drawBand(band: Float64Array): void {
+    const { ctx, bbox } = this.#plot;
+    const { time } = this.#lines;
+    const { min = 0, max = 1 } = this.#plot.scales.x;
+    const rowOf = (x: number) => rowAt(time, min + ((max - min) * x) / bbox.width);
+    for (let x = 0; x < bbox.width; x++) {
+      const [low, high] = extremes(band.subarray(rowOf(x), rowOf(x + 1) + 1));
+      const top = this.#plot.valToPos(high, "y", true);
+      const height = this.#plot.valToPos(low, "y", true) - top;
+      if (height >= 0) ctx.fillRect(bbox.left + x, top, 1, Math.max(height, 1));
+    }
   }
 
   #overlay(): void {
@@ -190,6 +229,7 @@ class Chart {
       ctx.stroke();
     }
     ctx.setLineDash([]);
+    const isNaming = this.#named && this.root.previousElementSibling === null;
     let after = -Infinity;
     for (const { from, label } of this.#marks) {
       const x = Math.round(this.#plot.valToPos(from, "x", true)) + 0.5;
@@ -198,7 +238,7 @@ class Chart {
       ctx.moveTo(x, bbox.top);
       ctx.lineTo(x, bbox.top + bbox.height);
       ctx.stroke();
-      if (this.#named) after = this.#name(label, x, after);
+      if (isNaming) after = this.#name(label, x, after);
     }
     ctx.restore();
   }
@@ -210,23 +250,26 @@ class Chart {
     ctx.save();
     ctx.font = `${11 * ratio}px system-ui, sans-serif`;
     ctx.fillStyle = property("--text");
-    ctx.strokeStyle = property("--surface");
-    ctx.lineWidth = 3 * ratio;
     const width = ctx.measureText(label).width;
-    const left = Math.max(bbox.left, Math.min(x + 4 * ratio, bbox.left + bbox.width - width));
-    const top = bbox.top + bbox.height - 6 * ratio;
+    const left = Math.max(bbox.left, Math.min(x - 3 * ratio, bbox.left + bbox.width - width));
+    const top = bbox.top - 7 * ratio;
     const hasRoom = left > after;
-    if (hasRoom) {
-      ctx.strokeText(label, left, top);
-      ctx.fillText(label, left, top);
-    }
+    if (hasRoom) ctx.fillText(label, left, top);
     ctx.restore();
     return hasRoom ? left + width : after;
   }
 
-  /** Draws the chart even if it is out of sight. */
-  print(): void {
-    if (!this.root.hidden) this.#redraw();
+  /** Draws the chart, even if it is out of sight, in a width [px]. */
+  print(width: number): void {
+    if (this.root.hidden) return;
+    this.#plot.setSize({ width, height: HEIGHT });
+    this.#redraw();
+  }
+
+  /** Takes the width that the page has for the chart. */
+  fit(): void {
+    const width = Math.floor(this.#host.clientWidth);
+    if (width > 0 && width !== this.#plot.width) this.#plot.setSize({ width, height: HEIGHT });
   }
 
   destroy(): void {
@@ -238,18 +281,28 @@ class Chart {
     this.#marks = marks;
     this.#named = named;
     this.root.hidden = !lines.values.some((values) => values);
-    this.#redrawIfVisible();
+    const names = this.#panel.names.filter((_, k) => lines.values[k]);
+    this.#host.setAttribute("aria-label", `${this.#caption} over time: ${names.join(", ")}`);
+    this.#stale = true;
   }
 
-  #redrawIfVisible(): void {
-    if (this.#visible && !this.root.hidden) this.#redraw();
-    else this.#stale = true;
+  /** Draws the chart if it is in sight and has changed; tells whether it does. */
+  refresh(): boolean {
+    const hasRows = this.#lines.time.length > 0;
+    const isDue = this.#stale && this.#visible && hasRows && !this.root.hidden;
+    if (isDue) this.#redraw();
+    return isDue;
   }
 
   #redraw(): void {
     this.#stale = false;
     this.root.classList.remove("pending");
-    this.#plot.setData([this.#lines.time, ...this.#lines.values.map((values) => withGaps(values))]);
+    const { time, values: lines } = this.#lines;
+    this.#bands = lines.map((values) => (values && chatters(values) ? values : undefined));
+    const drawn = lines.map((values, k) =>
+      withGaps(this.#bands[k] ? movingMean(time, this.#bands[k]) : values),
+    );
+    this.#plot.setData([time, ...drawn]);
     // uPlot also sets its new scales in a microtask.
     queueMicrotask(() => this.#point());
   }
@@ -257,12 +310,15 @@ class Chart {
   /** Lets the chart begin at another time [s], so that small values can be seen after large ones. */
   begin(from: number): void {
     this.#from = from;
-    this.#redrawIfVisible();
+    this.#stale = true;
+    this.refresh();
   }
 
   /** Draws again with other colours. */
   repaint(): void {
+    if (this.#stale) return;
     this.#plot.redraw(false);
+    this.#point();
   }
 
   show(time: number): void {
@@ -317,6 +373,9 @@ export function rowAt(times: Float64Array, time: number): number {
 /** The sections of charts. */
 export class Charts {
   #charts: Chart[][] = [];
+  #isRefreshing = false;
+  /** Number of the section that was drawn last. */
+  #last = -1;
   #from: number;
   readonly #host: HTMLElement;
   readonly #scrub: (time: number) => void;
@@ -325,9 +384,6 @@ export class Charts {
     this.#from = from;
     this.#host = host;
     this.#scrub = scrub;
-    addEventListener("beforeprint", () => {
-      for (const chart of this.#charts.flat()) chart.print();
-    });
   }
 
   /** Makes all charts. */
@@ -335,6 +391,7 @@ export class Charts {
     // uPlot keeps a reference to every plot until it is destroyed.
     for (const chart of this.#charts.flat()) chart.destroy();
     this.#host.replaceChildren();
+    this.#last = -1;
     this.#charts = sections.map(({ title, note, named, panels }, place) => {
       const aside = make("span", "note", note);
       const [{ names, styles }] = panels;
@@ -369,11 +426,42 @@ export class Charts {
   set(lines: readonly (readonly Lines[])[], marks: readonly Mark[]): void {
     this.#charts.forEach((charts, section) => {
       charts.forEach((chart, k) => {
-        chart.set(lines[section][k], marks, section === 0 && k === 0);
+        chart.set(lines[section][k], marks, section === 0);
       });
       const parent = charts[0].root.closest("section");
       if (parent) parent.hidden = charts.every(({ root }) => root.hidden);
+      parent?.querySelectorAll<HTMLElement>(".sample").forEach((sample, k) => {
+        sample.hidden = lines[section].every(({ values }) => values[k] === undefined);
+      });
     });
+    this.#refresh();
+  }
+
+  /** Draws the changed charts a section at a time, so that input never waits for all of them. */
+  #refresh(): void {
+    if (this.#isRefreshing) return;
+    this.#isRefreshing = true;
+    setTimeout(() => {
+      this.#isRefreshing = false;
+      // In turn, so that each is drawn even if all change again before.
+      for (let k = 0; k < this.#charts.length; k++) {
+        this.#last = (this.#last + 1) % this.#charts.length;
+        const drawn = this.#charts[this.#last].map((chart) => chart.refresh());
+        if (drawn.includes(true)) return this.#refresh();
+      }
+    });
+  }
+
+  /** Draws all charts in the width of a printed page [px]. */
+  print(page: number): void {
+    for (const charts of this.#charts) {
+      const width = Math.floor((page - GAP * (charts.length - 1)) / charts.length);
+      for (const chart of charts) chart.print(width);
+    }
+  }
+
+  fit(): void {
+    for (const chart of this.#charts.flat()) chart.fit();
   }
 
   show(time: number): void {

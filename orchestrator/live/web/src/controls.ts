@@ -2,7 +2,15 @@
 
 import { make, numberField } from "./dom";
 import { type Changes, parametersOf, type Settings } from "./settings";
-import { GROUPS, POSITIONS, positionOf, type Slider, sliderOf, valueAt } from "./sliders";
+import {
+  firstWords,
+  GROUPS,
+  POSITIONS,
+  positionOf,
+  type Slider,
+  sliderOf,
+  valueAt,
+} from "./sliders";
 import { entered } from "./text";
 import type { Parameter, Preset, Value, Values, VehicleData } from "./types";
 
@@ -102,17 +110,20 @@ class SliderRow {
   readonly #slider: HTMLInputElement;
   readonly #reset: HTMLButtonElement;
   readonly #error: HTMLElement;
+  #shown: string | undefined;
 
   constructor(row: Slider, parameters: readonly Parameter[], only: string, changed: Changed) {
     this.#row = row;
     const [parameter] = parameters;
     const spoken = row.spoken ?? parameter.name;
-    const label = make("span", "label");
-    label.innerHTML = row.label;
+    const words = row.words ?? firstWords(parameter.description);
+    const symbol = make("span", "symbol");
+    symbol.innerHTML = row.symbol;
+    const label = make("span", "label", words, "\u00a0", symbol);
     if (only) label.append(" ", make("span", "only", only));
     label.title = explained(parameter);
     const unit = make("span", "unit", parameter.unit ?? "");
-    this.#reset = make("button", "reset", "reset");
+    this.#reset = make("button", "reset", "↺");
     this.#reset.type = "button";
     this.#reset.title = `back to ${parameters.map(({ value }) => value).join(", ")}`;
     this.#reset.setAttribute("aria-label", `Reset ${spoken}`);
@@ -124,7 +135,7 @@ class SliderRow {
     this.#slider.type = "range";
     this.#slider.max = String(POSITIONS);
     this.#slider.step = String(stepOf(row));
-    this.#slider.setAttribute("aria-label", spoken);
+    this.#slider.setAttribute("aria-label", `${words}: ${spoken}`);
     this.#slider.title = row.spoken
       ? `sets ${row.names.join(", ")} together`
       : explained(parameter);
@@ -141,13 +152,17 @@ class SliderRow {
     this.#error.setAttribute("role", "alert");
     this.#error.hidden = true;
     const isSingle = parameters.length === 1;
-    const head = make("div", "head", label, this.#reset, ...(isSingle ? [fields, unit] : [unit]));
-    const below = isSingle ? [] : [fields];
-    this.root = make("div", "row", head, this.#slider, ...below, this.#error);
+    const head = make("div", "head", label, this.#reset);
+    const line = make("div", "line", this.#slider, ...(isSingle ? [fields] : []), unit);
+    this.root = make("div", "row", head, line, ...(isSingle ? [] : [fields]), this.#error);
   }
 
   show(given: Values): void {
+    // Most rows do not change while a slider moves.
+    const shown = this.#row.names.map((name) => given[name]).join();
     for (const field of this.fields) field.show(given[field.parameter.name]);
+    if (shown === this.#shown) return;
+    this.#shown = shown;
     const values = this.fields.map(({ parameter }) => given[parameter.name] ?? parameter.value);
     const last = values.length - 1;
     const value = Number(values[last]) * (this.#row.signs?.[last] ?? 1);
@@ -158,7 +173,8 @@ class SliderRow {
     }
     this.#slider.setAttribute("aria-valuetext", [...new Set(values)].join(", "));
     const isChanged = this.#row.names.some((name) => given[name] !== undefined);
-    this.#reset.hidden = !isChanged;
+    // It keeps its place, so that nothing moves while a slider does.
+    this.#reset.style.visibility = isChanged ? "" : "hidden";
     this.root.classList.toggle("changed", isChanged);
   }
 

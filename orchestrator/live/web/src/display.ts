@@ -4,13 +4,18 @@ import { Charts, type Mark, rowAt } from "./charts";
 import { element } from "./dom";
 import { IndicesTable } from "./indices_table";
 import { fillLegend } from "./legend";
-import { columnLines, columnSections, interleaved, lines, longest, sections } from "./panels";
+import { columnLines, columnSections, lines, longest, sections } from "./panels";
 import { Player } from "./player";
-import { missing, Scene, type Track } from "./scene";
+import { missing, Scene } from "./scene";
 import { fleetOf } from "./settings";
-import { controlPoint, metrics, reference } from "./signals";
+import { attitude, controlPoint, metrics, reference, rowsOf, smallestDistance } from "./signals";
+import { general } from "./text";
 import { colourLines, palette, themeButton } from "./theme";
 import type { Common, Comparison, Run, ShownLoop, VehicleData } from "./types";
+
+/** Width of a printed page, and height of the scene on it [px]. */
+const PAPER = 660;
+const PICTURE = 380;
 
 export class Display {
   readonly player: Player;
@@ -48,6 +53,27 @@ export class Display {
       document.documentElement.style.setProperty("--toolbar", `${target.clientHeight}px`);
     }).observe(element("toolbar"));
     themeButton(element("theme"), () => this.#paint());
+    this.#wirePrint();
+  }
+
+  /** Prints the scene and all charts, in light colours. */
+  #wirePrint(): void {
+    const { dataset } = document.documentElement;
+    let theme: string | undefined;
+    addEventListener("beforeprint", () => {
+      theme = dataset.theme;
+      dataset.theme = "light";
+      this.#paint();
+      this.#charts.print(PAPER);
+      this.#scene?.print(PAPER, PICTURE);
+    });
+    addEventListener("afterprint", () => {
+      if (theme === undefined) delete dataset.theme;
+      else dataset.theme = theme;
+      this.#scene?.fit();
+      this.#charts.fit();
+      this.#paint();
+    });
   }
 
   #makeScene(): Scene | undefined {
@@ -60,6 +86,22 @@ export class Display {
       host.append(missing("This browser has no WebGL: the path in space is not shown."));
       return undefined;
     }
+  }
+
+  /** Plays the runs once they are seen; with a time [s], or if motion is unwanted, shows it still. */
+  start(time?: number): void {
+    const { player } = this;
+    const stage = element("stage");
+    if (time !== undefined) player.seek(time);
+    if (time !== undefined || stage.hidden) return;
+    if (matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+    player.seek(-Infinity);
+    const seen = new IntersectionObserver(([{ isIntersecting }]) => {
+      if (!isIntersecting) return;
+      seen.disconnect();
+      if (!player.isPlaying && player.isAtStart) player.toggle();
+    });
+    seen.observe(stage);
   }
 
   /** Makes the charts of runs, for loops in the order in which they are drawn. */
@@ -144,13 +186,18 @@ export class Display {
     const fleet = loops[place].vehicles;
     const references = fleet.map((vehicle) => {
       const points = first && reference(first, vehicle);
-      return points && interleaved(points);
+      return points && rowsOf(points);
     });
     const hasReference = references.some((points) => points);
     const waypoints = first && hasReference ? waypointsOf(first) : [];
     this.#scene?.set({
       tracks: results.map((result, k) =>
-        result ? loops[k].vehicles.map((vehicle) => trackOf(result, vehicle)) : [],
+        result
+          ? loops[k].vehicles.map((vehicle) => ({
+              path: controlPoint(result, vehicle),
+              attitude: attitude(result, vehicle),
+            }))
+          : [],
       ),
       references,
       colours,
@@ -159,14 +206,15 @@ export class Display {
       ell: Math.max(
         ...fleet.map(({ vehicle }) => Number(first?.parameters[`${vehicle}.ell`] ?? 0)),
       ),
+      apart: Math.min(...results.map((result) => closest(result, fleet))),
       zUp,
     });
-    // The legend names references unless all have the colours of their vehicles.
-    const isNamed = colours.length === 0 || referenceColours.some((one) => !colours.includes(one));
     fillLegend(element("legend"), comparison, loops, [
-      ...(hasReference && isNamed ? ["reference"] : []),
+      ...(hasReference ? ["reference"] : []),
       ...(waypoints.length ? ["waypoints"] : []),
     ]);
+    const times = this.#scene?.times ?? 1;
+    element("scale").textContent = times > 1.05 ? `vehicles drawn × ${general(times, 2)}` : "";
   }
 
   #showTime(time: number): void {
@@ -176,12 +224,10 @@ export class Display {
   }
 }
 
-function trackOf(result: Run, vehicle: VehicleData): Track {
-  const angles = ["phi", "theta", "psi"].map((angle) => `${vehicle.vehicle}.eta.${angle}`);
-  return {
-    path: interleaved(controlPoint(result, vehicle)),
-    attitude: interleaved(angles.map((angle) => result.column(angle))),
-  };
+/** Returns the smallest distance between two vehicles in a run [m]. */
+function closest(result: Run | undefined, fleet: readonly VehicleData[]): number {
+  const distance = result && smallestDistance(result, fleet);
+  return distance?.reduce((a, b) => Math.min(a, b)) ?? Infinity;
 }
 
 /** End of the name of the first parameter of a PathPlanner's waypoints. */

@@ -54,7 +54,9 @@ export class IndicesTable {
         "tr",
         "index",
         heading("rowgroup", `${label}${unit}`),
-        ...Object.keys(units).map((member) => heading("col", `<i>${member}</i>`)),
+        ...Object.keys(units).map((member) =>
+          member ? heading("col", `<i>${member}</i>`) : make("td", ""),
+        ),
       );
       head.title = meaning;
       const values = measured.map(({ label: controller, place }) => {

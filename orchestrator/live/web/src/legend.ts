@@ -35,6 +35,8 @@ export function buildSwitches(
     });
     return make("label", "", box, make("span", "", swatch(String(place)), label));
   });
+  // A single controller cannot be hidden.
+  host.hidden = loops.length < 2;
   const legend = host.querySelector("legend");
   host.replaceChildren(...(legend ? [legend] : []), ...labels);
 }
@@ -51,7 +53,8 @@ export function fillLegend(
   others: readonly string[],
 ): void {
   const style = comparison.colours.length === 0 ? "" : " of-all";
-  const items = loops.map(({ label }, place) => [`${place}${style}`, label]);
+  const compared = loops.length > 1 ? loops : [];
+  const items = compared.map(({ label }, place) => [`${place}${style}`, label]);
   items.push(...others.map((name) => [name, name]));
   host.replaceChildren(
     ...vehicles(comparison),

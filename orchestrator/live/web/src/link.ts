@@ -11,6 +11,7 @@ import {
   withValues,
 } from "./settings";
 import { isDuration, isTime } from "./simulate";
+import { didYouMean } from "./suggest";
 import { numberOf } from "./text";
 import type { Data, EventData, Parameter, Value } from "./types";
 
@@ -20,6 +21,7 @@ const STEP = "step";
 const EVENTS = "events";
 const HIDDEN = "hide";
 const VEHICLE = "vehicle";
+const TIME = "time";
 
 /** Value of an unlimited duration in a link. */
 const FOR_GOOD = "always";
@@ -47,8 +49,17 @@ export function toHash(settings: Settings, data: Data): string {
   return `#${sent.map(([key, value]) => `${encode(key)}=${encode(value)}`).join("&")}`;
 }
 
-/** Reads settings from a link; also returns the fields that are not understood. */
-export function fromHash(hash: string, data: Data): { settings: Settings; unknown: string[] } {
+/** Settings of a link. */
+interface Found {
+  readonly settings: Settings;
+  /** Time to show [s]; absent: the run is played from its start. */
+  readonly time?: number;
+  /** Fields that are not understood. */
+  readonly unknown: string[];
+}
+
+/** Reads settings from a link. */
+export function fromHash(hash: string, data: Data): Found {
   const fields = [...new URLSearchParams(hash.replace(/^#/, ""))];
   const presets = fields.filter(([key]) => key === PRESET).map(([, name]) => name);
   const [wanted = data.opened, ...others] = presets;
@@ -60,6 +71,7 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
   const edited: [string, string][] = [];
   const hidden: string[] = [];
   let { stopTime, step, events, vehicle } = untouched(preset);
+  let time: number | undefined;
   for (const [key, text] of fields) {
     const parameter = parameters.get(key);
     const edit = EDIT.test(key);
@@ -69,6 +81,7 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
     if (parameter && value !== undefined) values[key] = value;
     else if (key === STOP_TIME && Number.isFinite(number)) stopTime = number;
     else if (key === STEP && Number.isFinite(number)) step = number;
+    else if (key === TIME && isTime(number)) time = number;
     else if (key === EVENTS && (text === "" || Object.hasOwn(preset.loops[0].events, text)))
       events = text;
     else if (key === VEHICLE && fleetOf(preset).includes(text)) vehicle = text;
@@ -90,7 +103,22 @@ export function fromHash(hash: string, data: Data): { settings: Settings; unknow
     if (edit) settings = withEdit(settings, preset, number, edit);
     else unknown.push(`${key}=${text}`);
   }
-  return { settings, unknown };
+  return { settings, unknown, ...(time === undefined ? {} : { time }) };
+}
+
+/** Returns a field that is not understood, with names that it may have meant. */
+export function suggested(field: string, settings: Settings, data: Data): string {
+  const [key, text] = field.split("=", 2);
+  const preset = presetOf(data, settings.preset) ?? data.presets[0];
+  const texts: Record<string, Iterable<string>> = {
+    [PRESET]: data.presets.map(({ name }) => name),
+    [EVENTS]: Object.keys(preset.loops[0].events),
+    [HIDDEN]: preset.loops.map(({ label }) => label),
+    [VEHICLE]: fleetOf(preset),
+  };
+  const names = [...parametersOf(preset).keys(), ...Object.keys(texts), STOP_TIME, STEP, TIME];
+  if (key in texts) return field + didYouMean(text, texts[key]);
+  return names.includes(key) ? field : field + didYouMean(key, names);
 }
 
 /** Reads a change of an event's time or duration; undefined: it is not valid in a scenario file. */

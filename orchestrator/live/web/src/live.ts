@@ -1,23 +1,32 @@
-// The live page: reads its data, runs the opened preset, and draws it.
+// The live page: reads its data, runs the opened preset in a worker, and draws it.
 
 import { type Api, makeApi } from "./api";
 import { sayFailure, unpacked } from "./dom";
 import { Page } from "./page";
-import { Engine } from "./simulate";
-import type { Data } from "./types";
+import { dataOf, RemoteEngine, serve } from "./worker";
 
-async function start(): Promise<Api> {
+async function start(script: string): Promise<Api> {
   const [[data], modules] = await Promise.all([unpacked("data"), unpacked("binary")]);
-  const found: Data = JSON.parse(new TextDecoder().decode(data));
-  const engine = await Engine.load(modules, found);
-  return makeApi(found, engine, new Page(found, engine));
+  const found = dataOf(data);
+  const engine = new RemoteEngine(script, { data, modules }, found);
+  const page = new Page(found, engine);
+  await page.shown;
+  return makeApi(found, engine, page);
 }
 
-const started = start();
-document.querySelector("form")?.addEventListener("submit", (event) => event.preventDefault());
-const api: Api = {
-  set: async (changes) => (await started).set(changes),
-  csv: async () => (await started).csv(),
-};
-Object.assign(globalThis, { auvfmu: api });
-started.catch(sayFailure);
+function open(): void {
+  // In a frame of another page there is less room.
+  document.documentElement.classList.toggle("framed", window !== window.parent);
+  const started = start(document.currentScript?.textContent ?? "");
+  document.querySelector("form")?.addEventListener("submit", (event) => event.preventDefault());
+  const api: Api = {
+    set: async (changes) => (await started).set(changes),
+    csv: async () => (await started).csv(),
+  };
+  Object.assign(globalThis, { auvfmu: api });
+  started.catch(sayFailure);
+}
+
+// The worker runs this script, too.
+if (typeof document === "undefined") serve();
+else open();

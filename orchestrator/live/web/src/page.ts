@@ -6,7 +6,7 @@ import { Display } from "./display";
 import { element, make } from "./dom";
 import { EventsForm } from "./events_form";
 import { buildSwitches } from "./legend";
-import { fromHash, toHash } from "./link";
+import { fromHash, suggested, toHash } from "./link";
 import {
   eventsOf,
   fleetOf,
@@ -16,7 +16,7 @@ import {
   withEdit,
   withValues,
 } from "./settings";
-import { type Engine, Refusal } from "./simulate";
+import { Refusal, type Runner } from "./simulate";
 import { csvLines, entered } from "./text";
 import type { Data, LoopData, Preset, Result } from "./types";
 
@@ -29,9 +29,18 @@ const NOTICE = 4000;
 /** Most unknown parts of a link in a notice. */
 const NAMED = 5;
 
+/** Waits for the next frame; a hidden page draws none, and continues at once. */
+function nextFrame(): Promise<unknown> {
+  return document.hidden
+    ? Promise.resolve()
+    : new Promise((resolve) => requestAnimationFrame(resolve));
+}
+
 export class Page {
+  /** Kept once the first runs are shown. */
+  readonly shown: Promise<void>;
   readonly #data: Data;
-  readonly #engine: Engine;
+  readonly #engine: Runner;
   readonly #display: Display;
   readonly #controls: Controls;
   readonly #events: EventsForm;
@@ -45,18 +54,20 @@ export class Page {
   #loops: readonly LoopData[] = [];
   /** Last successful runs, in the order of the loops. */
   #results: (Result | undefined)[] = [];
-  /** Results before these, which are no longer shown. */
-  #spare: readonly (Result | undefined)[] = [];
+  /** Tables of results that are no longer shown. */
+  #spare: ArrayBuffer[] = [];
   /** Why the settings are refused; empty: they were run. */
   #refusal = "";
-  #asked = false;
+  /** True if the settings have changed since the last run began. */
+  #isAsked = false;
+  #running: Promise<void> | undefined;
   #link: ReturnType<typeof setTimeout> | undefined;
   #notice: ReturnType<typeof setTimeout> | undefined;
 
-  constructor(data: Data, engine: Engine) {
+  constructor(data: Data, engine: Runner) {
     this.#data = data;
     this.#engine = engine;
-    const { settings, unknown } = fromHash(location.hash, data);
+    const { settings, unknown, time } = fromHash(location.hash, data);
     this.#settings = settings;
     this.#preset = presetOf(data, settings.preset) ?? data.presets[0];
     this.#display = new Display(data);
@@ -68,15 +79,13 @@ export class Page {
       edit: (number, edit) => this.#take(withEdit(this.#settings, this.#preset, number, edit)),
     });
     this.#wire();
-    this.#open();
+    this.shown = this.#open().then(() => this.#display.start(time));
     this.#sayUnknown(unknown);
   }
 
   #wire(): void {
     const select = element<HTMLSelectElement>("preset");
-    select.append(
-      ...this.#data.presets.map(({ name, title }) => new Option(`${name}: ${title}`, name)),
-    );
+    select.append(...this.#data.presets.map(({ name, title }) => new Option(title, name)));
     select.addEventListener("change", () => {
       const preset = presetOf(this.#data, select.value);
       if (preset) this.apply(untouched(preset));
@@ -85,6 +94,9 @@ export class Page {
     vehicle.addEventListener("change", () =>
       this.apply({ ...this.#settings, vehicle: vehicle.value }),
     );
+    element("whole").addEventListener("click", (event) => {
+      (event.target as HTMLAnchorElement).href = toHash(this.#settings, this.#data);
+    });
     element("copy-link").addEventListener("click", () => {
       this.#writeLink();
       this.#copy(location.href, "Link copied");
@@ -110,18 +122,18 @@ export class Page {
     );
     addEventListener("hashchange", () => {
       if (location.hash === toHash(this.#settings, this.#data)) return;
-      const { settings, unknown } = fromHash(location.hash, this.#data);
+      const { settings, unknown, time } = fromHash(location.hash, this.#data);
       this.#settings = settings;
-      this.#open();
+      this.#open().then(() => time !== undefined && this.#display.player.seek(time));
       this.#sayUnknown(unknown);
     });
   }
 
   /** Replaces all settings, and runs. */
-  apply(settings: Settings): void {
+  apply(settings: Settings): Promise<void> {
     this.#settings = settings;
-    this.#open();
     this.#linkLater();
+    return this.#open();
   }
 
   get settings(): Settings {
@@ -129,7 +141,7 @@ export class Page {
   }
 
   /** Makes the elements for a preset, and runs it. */
-  #open(): void {
+  #open(): Promise<void> {
     this.#preset = presetOf(this.#data, this.#settings.preset) ?? this.#data.presets[0];
     this.#loops = this.#preset.drawn.map((place) => this.#preset.loops[place]);
     document.title = this.#preset.title;
@@ -147,9 +159,7 @@ export class Page {
     }
     this.#openVehicle();
     this.#built = this.#preset;
-    this.#run();
-    const { player } = this.#display;
-    player.seek(player.time);
+    return this.#run();
   }
 
   /** Makes the controls of the chosen vehicle. */
@@ -172,52 +182,80 @@ export class Page {
   #take(settings: Settings): void {
     this.#settings = settings;
     this.#linkLater();
-    if (this.#asked) return;
-    // One run per frame, even if a slider moves several times.
-    this.#asked = true;
-    requestAnimationFrame(() => {
-      if (this.#asked) this.#run();
-    });
+    this.#run();
   }
 
-  /** Runs the settings, and shows the results. */
-  #run(): void {
-    this.#asked = false;
-    this.#showSettings();
+  /** Runs the settings, and shows the results; settings during a run wait, and the latest count. */
+  #run(): Promise<void> {
+    this.#isAsked = true;
+    this.#running ??= this.#runAll().finally(() => {
+      this.#running = undefined;
+    });
+    return this.#running;
+  }
+
+  async #runAll(): Promise<void> {
+    while (this.#isAsked) {
+      this.#isAsked = false;
+      this.#showSettings();
+      await this.#runOnce();
+      // No more than one run per frame, even if a slider moves several times.
+      if (this.#isAsked) await nextFrame();
+    }
+  }
+
+  async #runOnce(): Promise<void> {
+    const preset = this.#preset;
+    let results: (Result | undefined)[];
+    let refusal = "";
     try {
-      const shown = this.#results;
-      this.#results = this.#runs(this.#settings, this.#spare);
-      this.#spare = shown;
-      this.#refusal = "";
+      results = await this.#runs(this.#settings);
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;
-      this.#refusal = error.message;
-      this.#refuse(error.message);
+      refusal = error.message;
+      results = this.#results;
       // The last successful runs stay; after a link, there may be none.
-      if (this.#results.length > 0) return;
-      const { hidden, vehicle } = this.#settings;
-      this.#results = this.#runs({ ...untouched(this.#preset), hidden, vehicle });
-      this.#draw();
-      return;
+      if (results.length === 0) {
+        const { hidden, vehicle } = this.#settings;
+        results = await this.#runs({ ...untouched(preset), hidden, vehicle });
+      }
     }
-    const failures = this.#each(({ failure }) => (failure === undefined ? [] : [failure]));
-    const said = this.#each(({ remark, messages }) => [...(remark ? [remark] : []), ...messages]);
-    this.#refuse(failures.join("; "), said.join("\n"));
+    if (preset !== this.#preset) return;
+    this.#refusal = refusal;
+    if (refusal) {
+      this.#refuse(refusal);
+    } else {
+      const failures = this.#each(results, ({ failure }) => (failure ? [failure] : []));
+      const said = this.#each(results, ({ remark, cautions, messages }) => [
+        ...(remark ? [remark] : []),
+        ...cautions,
+        ...messages,
+      ]);
+      this.#refuse(failures.join("; "), said.join("\n"));
+    }
+    if (results === this.#results) return;
+    this.#spare.push(...this.#results.flatMap((one) => one?.table.buffer ?? []));
+    this.#results = results;
     this.#draw();
   }
 
-  #runs(settings: Settings, spare: readonly (Result | undefined)[] = []): (Result | undefined)[] {
+  async #runs(settings: Settings): Promise<(Result | undefined)[]> {
     const { values, stopTime, step, hidden } = settings;
-    return this.#loops.map((loop, k) => {
+    const spare = this.#spare.splice(0);
+    const runs = this.#loops.map((loop) => {
       if (hidden.includes(loop.label)) return undefined;
       const events = eventsOf(settings, loop);
-      return this.#engine.run(loop, values, { stopTime, step, events, spare: spare[k] });
+      return this.#engine.run(loop, values, { stopTime, step, events, spare: spare.pop() });
     });
+    return Promise.all(runs);
   }
 
   /** Returns texts about the results, each with the name of its controller. */
-  #each(texts: (result: Result) => readonly string[]): string[] {
-    return this.#results.flatMap((result, k) =>
+  #each(
+    results: readonly (Result | undefined)[],
+    texts: (result: Result) => readonly string[],
+  ): string[] {
+    return results.flatMap((result, k) =>
       result ? texts(result).map((text) => `${this.#loops[k].label}: ${text}`) : [],
     );
   }
@@ -285,22 +323,22 @@ export class Page {
   }
 
   /** Returns the result of the loop to export; if there is none, a notice shows why. */
-  #result(): Result | undefined {
-    if (this.#asked) this.#run();
+  async #result(): Promise<Result | undefined> {
+    await this.#running;
     const result = this.#results[this.#loops.indexOf(this.#exported())];
     if (this.#refusal) this.#say(`Not run: ${this.#refusal}`);
     else if (!result) this.#say("Show a controller first");
     return this.#refusal ? undefined : result;
   }
 
-  #copyCommand(): void {
-    if (!this.#result()) return;
+  async #copyCommand(): Promise<void> {
+    if (!(await this.#result())) return;
     const command = commandLine(this.#settings, this.#preset, this.#exported());
     this.#copy(command, "Command copied");
   }
 
-  #download(): void {
-    const result = this.#result();
+  async #download(): Promise<void> {
+    const result = await this.#result();
     if (!result) return;
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob(csvLines(result), { type: "text/csv" }));
@@ -326,7 +364,10 @@ export class Page {
   }
 
   #sayUnknown(unknown: readonly string[]): void {
-    const named = unknown.slice(0, NAMED).join(", ");
+    const named = unknown
+      .slice(0, NAMED)
+      .map((field) => suggested(field, this.#settings, this.#data))
+      .join(", ");
     const more = unknown.length > NAMED ? `, and ${unknown.length - NAMED} more` : "";
     this.#say(named && `Not understood in the link: ${named}${more}`);
   }

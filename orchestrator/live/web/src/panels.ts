@@ -4,8 +4,8 @@ import { commandName, inSteps, limits, smallestDistance, trackingError } from ".
 import { escaped } from "./text";
 import type { Common, Run, Units, VehicleData } from "./types";
 
-/** Colour and style of a line: of a controller, a true or wanted value, or all vehicles. */
-export type Style = "first" | "second" | "reference" | "first-of-all" | "second-of-all";
+/** Colour and style of a line: of a controller, a true value, or all vehicles. */
+export type Style = "first" | "second" | "true" | "first-of-all" | "second-of-all";
 
 export interface Panel {
   /** HTML. */
@@ -27,6 +27,8 @@ export interface Section {
 /** Values of a panel's lines, with the times of their rows. */
 export interface Lines {
   readonly time: Float64Array;
+  /** End of the chart [s], if it is later than the last row. */
+  readonly until?: number;
   readonly values: readonly (Float64Array | undefined)[];
   /** Limits of a command, if it has any. */
   readonly limits?: readonly [number, number];
@@ -72,7 +74,7 @@ export function sections(
       note: "",
       named: true,
       panels: Object.entries(units.dy).map(([axis, unit]) => ({
-        styles: ["first", "reference"],
+        styles: ["first", "true"],
         names: ["estimated by the observer", "true"],
         title: `<i>y&#775;<sub>${axis}</sub></i>`,
         unit,
@@ -120,8 +122,8 @@ export function lines(
   const whole = longest(results);
   const time = whole?.time ?? new Float64Array(0);
   const rows = Math.max(0, (whole?.rows ?? 0) - 1);
-  /** Times at which steps begin. */
-  const starts = time.subarray(0, rows);
+  /** Times at which steps begin, and the end of the last one. */
+  const inEachStep = { time: time.subarray(0, rows), until: time[rows] ?? 0 };
   const ofEach = <T>(make: (result: Run, chosen: Chosen) => T): (T | undefined)[] =>
     results.map((result, place) => result && make(result, chosen[place]));
   const errors = ofEach((result, { vehicle }) => trackingError(result, vehicle));
@@ -139,17 +141,17 @@ export function lines(
         steps(result, commandName(result, vehicle, member)),
       );
       const ends = whole && limits(whole, chosen[results.indexOf(whole)].vehicle, member);
-      return { time: starts, values, ...(ends ? { limits: ends } : {}) };
+      return { ...inEachStep, values, ...(ends ? { limits: ends } : {}) };
     }),
     Object.keys(units.dy).map((axis) => ({
-      time: starts,
+      ...inEachStep,
       values: [
         steps(results[observed], `${vehicle.controller}.dy_hat.${axis}`),
         known(results[moving], `${vehicle.vehicle}.dy.${axis}`)?.subarray(0, rows),
       ],
     })),
     Object.keys(units.theta_hat).map((k) => ({
-      time: starts,
+      ...inEachStep,
       values: ofEach((result, { vehicle }) =>
         steps(result, `${vehicle.controller}.theta_hat[${k}]`),
       ),
@@ -197,14 +199,4 @@ function groupsOf(columns: Units): [string, string[]][] {
 
 function known(result: Run | undefined, name: string): Float64Array | undefined {
   return result?.has(name) ? result.column(name) : undefined;
-}
-
-/** Returns columns row by row, a number of each column. */
-export function interleaved(columns: readonly Float64Array[]): Float64Array {
-  const width = columns.length;
-  const values = new Float64Array(width * columns[0].length);
-  columns.forEach((column, k) => {
-    for (let row = 0; row < column.length; row++) values[width * row + k] = column[row];
-  });
-  return values;
 }

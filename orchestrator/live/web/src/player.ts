@@ -42,13 +42,13 @@ export class Player {
     });
   }
 
-  get time(): number {
-    return this.#time;
-  }
-
   /** Positions of the slider per second, a power of ten. */
   get #fine(): number {
     return 10 ** Math.max(1, Math.ceil(Math.log10(POSITIONS / (this.#end - this.#start || 1))));
+  }
+
+  get isAtStart(): boolean {
+    return this.#time <= this.#start;
   }
 
   get isPlaying(): boolean {

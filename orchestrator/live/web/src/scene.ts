@@ -3,6 +3,7 @@
 import { Camera, type Mesh, Renderer, Transform } from "ogl";
 import { make } from "./dom";
 import { PathLine, POINTS, Primitives, paintVehicle, vehicleMesh } from "./meshes";
+import type { Rows } from "./signals";
 import {
   axesOf,
   type Box,
@@ -20,12 +21,12 @@ import { mixed, type Palette, vehicleColour } from "./theme";
 import { Turning } from "./turning";
 import type { Hull } from "./types";
 
-/** Path and attitudes of a vehicle in a run: three numbers for each row. */
-export interface Track {
+/** Path and attitudes of a vehicle in a run. */
+interface Track {
   /** Control point [m], earth frame. */
-  path: Float64Array;
+  path: Rows;
   /** Roll, pitch and yaw [rad]. */
-  attitude: Float64Array;
+  attitude: Rows;
 }
 
 /** Content of a scene. */
@@ -33,7 +34,7 @@ interface Shown {
   /** Tracks of all vehicles, by controller; empty: the controller is hidden. */
   tracks: readonly (readonly Track[])[];
   /** References of the vehicles; undefined: no reference. */
-  references: readonly (Float64Array | undefined)[];
+  references: readonly (Rows | undefined)[];
   /** Colours of the vehicles; empty: each controller has its colour. */
   colours: readonly string[];
   /** Colours of the references. */
@@ -42,16 +43,24 @@ interface Shown {
   waypoints: readonly number[];
   /** Distance of the control point from the centre of mass [m]. */
   ell: number;
+  /** Smallest distance between two vehicles [m]. */
+  apart: number;
   zUp: boolean;
 }
 
 /** Half the angle of view [rad]. */
 const HALF = 0.3;
 
-/** Least length of the drawn vehicle: shares of the two largest extents, and a multiple of ell. */
+/** Length of a vehicle, a multiple of ell: the control point is the nose. */
+const LENGTH = 2;
+
+/** Length at which a vehicle is drawn, unless it is longer: shares of the two largest extents. */
 const OF_LARGEST = 0.09;
 const OF_SECOND = 0.2;
-const LENGTH = 2;
+
+/** Most of the smallest distance between two vehicles, and least of the largest extent. */
+const OF_DISTANCE = 0.6;
+const LEAST = 0.045;
 
 /** Most marks of references. */
 const MOST_TARGETS = 1000;
@@ -73,9 +82,12 @@ export function missing(text: string): HTMLElement {
   return make("p", "missing", text);
 }
 
-/** Shares of the background in a path after the current time, and of grey in a vehicle's reference. */
+/** Shares of the background in a path after the current time, of grey in a vehicle's reference. */
 const LATER = 0.68;
-const FAINT = 0.35;
+const FAINT = 0.5;
+
+/** Share of the text's colour in a vehicle's colour with the second controller. */
+const OTHER = 0.5;
 
 /** Path and mesh of a vehicle with a controller. */
 interface Drawing {
@@ -105,6 +117,7 @@ export class Scene {
     referenceColours: [],
     waypoints: [],
     ell: 0.35,
+    apart: Infinity,
     zUp: false,
   };
   #palette: Palette | undefined;
@@ -113,8 +126,10 @@ export class Scene {
   #scale = 1;
   #middle: Vector = [0, 0, 0];
   #length = 1;
+  #times = 1;
   #row = 0;
   #rows = 1;
+  #picture: HTMLCanvasElement | undefined;
   #asked = false;
   #lost = false;
 
@@ -135,7 +150,7 @@ export class Scene {
     const gl = this.#renderer.gl;
     this.#camera = new Camera(gl, { fov: (HALF * 360) / Math.PI, near: 0.05, far: 50 });
     this.#grid = new Primitives(gl, 400, gl.LINES);
-    this.#target = new Primitives(gl, MOST_TARGETS, gl.POINTS, 7 * this.#renderer.dpr);
+    this.#target = new Primitives(gl, MOST_TARGETS, gl.POINTS, 5 * this.#renderer.dpr);
     this.#waypoints = new Primitives(gl, 400, gl.LINES);
     for (const { mesh } of [this.#grid, this.#target, this.#waypoints]) {
       mesh.setParent(this.#root);
@@ -190,10 +205,11 @@ export class Scene {
 
   paint(palette: Palette): void {
     this.#palette = palette;
-    const { background, controllers, reference, highlight, grid } = palette;
+    const { background, controllers, reference, highlight, grid, text } = palette;
     const colours = this.#shown.colours.map(vehicleColour);
     for (const { controller, vehicle, path, mesh } of this.#drawings) {
-      const colour = colours[vehicle] ?? controllers[controller];
+      const own = colours[vehicle];
+      const colour = own ? mixed(own, text, controller * OTHER) : controllers[controller];
       path.paint(colour, mixed(colour, background, LATER));
       paintVehicle(mesh, colour, highlight, reference);
     }
@@ -208,16 +224,25 @@ export class Scene {
     this.draw();
   }
 
+  /** Ratio of the length at which vehicles are drawn to their own. */
+  get times(): number {
+    return this.#times;
+  }
+
   /** Shows other runs or vehicles. */
   set(shown: Shown): void {
     this.#shown = shown;
     this.#provide(shown.tracks, shown.references.length);
-    const seen = shown.tracks.flat().map(({ path }) => path);
-    const references = shown.references.filter((one) => one !== undefined);
-    const held = [...seen, ...references, shown.waypoints];
+    const paths = shown.tracks.map((tracks) => tracks.map(({ path }) => sampled(path)));
+    const references = shown.references.map((points) => points && sampled(points));
+    const lines = references.flatMap((points) => (points ? [points] : []));
+    const held = [...paths.flat(), ...lines, shown.waypoints];
     const tight = boxOf(held, 0);
     const [largest, second] = extents(tight);
-    this.#length = Math.max(OF_LARGEST * largest, OF_SECOND * second, LENGTH * shown.ell);
+    const large = Math.max(OF_LARGEST * largest, OF_SECOND * second);
+    const own = LENGTH * shown.ell;
+    this.#length = Math.max(own, LEAST * largest, Math.min(large, OF_DISTANCE * shown.apart));
+    this.#times = this.#length / own;
     const box = boxOf(held, 0.6 * this.#length);
     this.#box = this.#drawnBox(box);
     this.#scale = 1 / extents(this.#box)[0];
@@ -227,16 +252,16 @@ export class Scene {
       const track = shown.tracks[controller]?.[vehicle];
       path.mesh.visible = mesh.visible = track !== undefined;
       if (track) {
-        path.place(this.#sampled(track.path));
-        this.#rows = Math.max(this.#rows, track.path.length / 3);
+        path.place(this.#placedAll(paths[controller][vehicle]));
+        this.#rows = Math.max(this.#rows, track.path.rows);
       }
     }
     this.#references.forEach((line, vehicle) => {
-      const points = shown.references[vehicle];
+      const points = references[vehicle];
       line.mesh.visible = points !== undefined;
-      if (points) line.place(this.#sampled(points));
+      if (points) line.place(this.#placedAll(points));
     });
-    this.#target.mesh.visible = references.length > 0;
+    this.#target.mesh.visible = lines.length > 0;
     this.#waypoints.place(this.#crosses(shown.waypoints));
     if (this.#palette) this.paint(this.#palette);
     this.show(this.#row);
@@ -250,22 +275,21 @@ export class Scene {
       const track = tracks[controller]?.[vehicle];
       if (!track) continue;
       // A failed run has fewer rows.
-      const last = track.path.length / 3 - 1;
+      const last = track.path.rows - 1;
       path.progress = last > 0 ? this.#row / last : 1;
       this.#pose(mesh, track, Math.min(this.#row, last));
     }
     const targets = references.flatMap((points) => {
       if (!points) return [];
-      const at = 3 * Math.min(this.#row, points.length / 3 - 1);
-      return this.#placed(points[at], points[at + 1], points[at + 2]);
+      return this.#placed(...points.at(Math.min(this.#row, points.rows - 1)));
     });
     this.#target.place(targets);
     this.draw();
   }
 
   #pose(mesh: Mesh, { path, attitude }: Track, row: number): void {
-    const r = rotation(attitude[3 * row], attitude[3 * row + 1], attitude[3 * row + 2]);
-    const at = this.#placed(path[3 * row], path[3 * row + 1], path[3 * row + 2]);
+    const r = rotation(...attitude.at(row));
+    const at = this.#placed(...path.at(row));
     // With z up, the body frame also has y to port and z up.
     const sign = this.#shown.zUp ? -1 : 1;
     const size = this.#length * this.#scale;
@@ -310,14 +334,12 @@ export class Scene {
     return lines;
   }
 
-  #sampled(points: Float64Array): Float32Array {
-    const sampled = new Float32Array(3 * POINTS);
-    const last = points.length / 3 - 1;
-    for (let i = 0; i < POINTS; i++) {
-      const from = 3 * Math.round((i * last) / (POINTS - 1));
-      sampled.set(this.#placed(points[from], points[from + 1], points[from + 2]), 3 * i);
+  #placedAll(points: Float64Array): Float32Array {
+    const placed = new Float32Array(points.length);
+    for (let i = 0; i < points.length; i += 3) {
+      placed.set(this.#placed(points[i], points[i + 1], points[i + 2]), i);
     }
-    return sampled;
+    return placed;
   }
 
   /** Draws once before the next frame, even if it is called several times. */
@@ -326,11 +348,31 @@ export class Scene {
     this.#asked = true;
     requestAnimationFrame(() => {
       this.#asked = false;
-      this.drawNow();
+      this.#drawNow();
     });
   }
 
-  drawNow(): void {
+  /** Puts a picture of a size [px] into the scene: on paper a canvas with WebGL is empty. */
+  print(width: number, height: number): void {
+    const size = `width: ${width}px; height: ${height}px`;
+    this.#host.style.cssText = `flex: none; min-height: 0; max-height: none; ${size}`;
+    this.#resize();
+    this.#drawNow();
+    const { canvas } = this.#renderer.gl;
+    const { width: columns, height: rows } = canvas;
+    this.#picture = Object.assign(make("canvas", "picture"), { width: columns, height: rows });
+    this.#picture.getContext("2d")?.drawImage(canvas, 0, 0);
+    this.#labels.before(this.#picture);
+  }
+
+  /** Takes the picture away again. */
+  fit(): void {
+    this.#picture?.remove();
+    this.#host.style.cssText = "";
+    this.#resize();
+  }
+
+  #drawNow(): void {
     const { clientWidth: width, clientHeight: height } = this.#host;
     if (this.#lost || !width || !height) return;
     const { low, high } = this.#box;
@@ -382,4 +424,13 @@ export class Scene {
     }
     while (spans.length > used) spans[used].remove();
   }
+}
+
+/** Returns the points of a path that are drawn: three numbers each. */
+function sampled({ rows, at }: Rows): Float64Array {
+  const points = new Float64Array(3 * POINTS);
+  for (let i = 0; i < POINTS; i++) {
+    points.set(at(Math.round((i * (rows - 1)) / (POINTS - 1))), 3 * i);
+  }
+  return points;
 }

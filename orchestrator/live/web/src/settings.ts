@@ -9,6 +9,7 @@ import type {
   Preset,
   Value,
   Values,
+  VehicleData,
 } from "./types";
 
 /** Changed time or duration of an event [s]; `lasts` null: until the run ends. */
@@ -45,6 +46,15 @@ export function presetOf(data: Data, name: string): Preset | undefined {
 /** Returns the names of the vehicles in a comparison. */
 export function fleetOf({ loops }: Comparison): readonly string[] {
   return loops[0].vehicles.map(({ name }) => name);
+}
+
+/** Returns the names in a text for the components of a vehicle; the text has a single vehicle's. */
+export function namedFor(vehicle: VehicleData, text: string): string {
+  const names = { ...vehicle, plant: vehicle.vehicle };
+  return text.replace(
+    /\b(plant|controller|planner|disturbance)(?=\.)/,
+    (role) => names[role as keyof typeof names],
+  );
 }
 
 /** Returns the settings of a preset without changes. */

@@ -1,44 +1,50 @@
 // Signals that are computed from the rows of a run.
+
+import type { Vector } from "./space";
 import type { Metrics, Run, VehicleData } from "./types";
 
 const AXES = ["x", "y", "z"];
 
 type Columns = Float64Array[];
 
-/** Signals of runs that were computed before, by vehicle. */
-const points = new WeakMap<Run, Map<string, Columns>>();
+/** Signals of runs that were computed before: errors by vehicle, and smallest distances. */
 const errors = new WeakMap<Run, Map<string, Columns>>();
 const gaps = new WeakMap<Run, Float64Array>();
 
-function made(
-  known: WeakMap<Run, Map<string, Columns>>,
-  result: Run,
-  vehicle: VehicleData,
-  make: () => Columns,
-): Columns {
-  const all = known.get(result) ?? new Map<string, Columns>();
-  const found = all.get(vehicle.vehicle) ?? make();
-  known.set(result, all.set(vehicle.vehicle, found));
-  return found;
+/** Points or angles in each row. */
+export interface Rows {
+  readonly rows: number;
+  at(row: number): Vector;
 }
 
-/** Returns the coordinates of the control point without noise [m]: (9) for the vehicle's posture. */
-export function controlPoint(result: Run, vehicle: VehicleData): Columns {
-  return made(points, result, vehicle, () => {
-    const name = vehicle.vehicle;
-    const [phi, theta, psi] = ["phi", "theta", "psi"].map((angle) =>
-      result.column(`${name}.eta.${angle}`),
-    );
-    const ell = Number(result.parameters[`${name}.ell`]);
-    const [x, y, z] = AXES.map((axis) => result.column(`${name}.eta.${axis}`).slice());
-    for (let k = 0; k < phi.length; k++) {
+/** Returns three columns row by row. */
+export function rowsOf([x, y, z]: Columns): Rows {
+  return { rows: x.length, at: (row) => [x[row], y[row], z[row]] };
+}
+
+/** Returns roll, pitch and yaw [rad]. */
+export function attitude(result: Run, { vehicle }: VehicleData): Rows {
+  return rowsOf(["phi", "theta", "psi"].map((angle) => result.column(`${vehicle}.eta.${angle}`)));
+}
+
+/** Returns the control point without noise [m]: (9) for the vehicle's posture. */
+export function controlPoint(result: Run, { vehicle }: VehicleData): Rows {
+  const [x, y, z, theta, psi] = [...AXES, "theta", "psi"].map((name) =>
+    result.column(`${vehicle}.eta.${name}`),
+  );
+  const ell = Number(result.parameters[`${vehicle}.ell`]);
+  return {
+    rows: result.rows,
+    at(row) {
       // The first column of the rotation is the direction of the nose.
-      x[k] += ell * Math.cos(psi[k]) * Math.cos(theta[k]);
-      y[k] += ell * Math.sin(psi[k]) * Math.cos(theta[k]);
-      z[k] -= ell * Math.sin(theta[k]);
-    }
-    return [x, y, z];
-  });
+      const ahead = ell * Math.cos(theta[row]);
+      return [
+        x[row] + ahead * Math.cos(psi[row]),
+        y[row] + ahead * Math.sin(psi[row]),
+        z[row] - ell * Math.sin(theta[row]),
+      ];
+    },
+  };
 }
 
 /** Returns the coordinates of the reference y_d [m]; undefined: there is no reference. */
@@ -51,9 +57,17 @@ export function reference(result: Run, { planner }: VehicleData): Columns | unde
 export function trackingError(result: Run, vehicle: VehicleData): Columns | undefined {
   const wanted = reference(result, vehicle);
   if (wanted === undefined) return undefined;
-  return made(errors, result, vehicle, () =>
-    controlPoint(result, vehicle).map((y, i) => y.map((value, k) => value - wanted[i][k])),
-  );
+  const known = errors.get(result)?.get(vehicle.vehicle);
+  if (known) return known;
+  const { rows, at } = controlPoint(result, vehicle);
+  const found = AXES.map(() => new Float64Array(rows));
+  for (let row = 0; row < rows; row++) {
+    at(row).forEach((value, i) => {
+      found[i][row] = value - wanted[i][row];
+    });
+  }
+  errors.set(result, (errors.get(result) ?? new Map()).set(vehicle.vehicle, found));
+  return found;
 }
 
 /** Returns the smallest distance of two centres of mass [m]; undefined: there is one vehicle. */

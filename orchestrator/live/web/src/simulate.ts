@@ -1,16 +1,20 @@
 // A run of a loop: its times, events and parameters for the program, and its rows.
 
-import { type Agenda, Module, REAL, type Reducer, type Refused } from "./program";
+import { type Agenda, Module, type Reducer, type Refused } from "./program";
+import { namedFor } from "./settings";
 import { general } from "./text";
 import type {
   Action,
   Data,
   EventData,
   LoopData,
+  Metrics,
   Occurrence,
   Options,
+  Outcome,
   Parameter,
   Result,
+  Run,
   Value,
   Values,
 } from "./types";
@@ -181,10 +185,16 @@ function whyEnded(events: readonly EventData[], happened: readonly Occurrence[])
   return action.kind === "stop" ? action.why : "";
 }
 
-/** Runs loops by programs in modules. */
-export class Engine {
-  private readonly layouts = new WeakMap<LoopData, Layout>();
+/** A field in the text of a rule: a name, and the digits of its value. */
+const FIELD = /\{([\w.]+)(?::\.?(\d*)g)?\}/g;
 
+/** Runs loops, here or in a worker; throws `Refusal` if a value or a time is not usable. */
+export interface Runner {
+  run(loop: LoopData, values: Values, options: Options): Result | Promise<Result>;
+}
+
+/** Runs loops by programs in modules. */
+export class Engine implements Runner {
   private constructor(
     private readonly modules: readonly Module[],
     private readonly data: Data,
@@ -195,19 +205,24 @@ export class Engine {
     return new Engine(await Promise.all(modules.map((bytes) => Module.load(bytes))), data);
   }
 
-  /**
-   * Runs a loop with its own values except for `values`; unknown names are ignored.
-   *
-   * Throws `Refusal` with the reason if a value or a time is not usable.
-   */
-  run(loop: LoopData, values: Values, { stopTime, step, events = [], spare }: Options): Result {
+  /** Runs a loop with its own values except for `values`; unknown names are ignored. */
+  run(loop: LoopData, values: Values, options: Options): Result {
+    return resultOf(loop, this.outcome(loop, values, options));
+  }
+
+  /** Runs a loop, and returns plain data. */
+  outcome(
+    loop: LoopData,
+    values: Values,
+    { stopTime, step, events = [], spare }: Options,
+  ): Outcome {
     const mostSteps = Math.floor(this.data.mostSteps / loop.vehicles.length);
     const experiment = new Experiment(stopTime, step, mostSteps);
     if (loop.fixedStep !== undefined && step !== loop.fixedStep)
       throw new Refusal(
         `step ${step} s: a component takes longer steps, which are multiples of ${loop.fixedStep} s`,
       );
-    const layout = this.layoutOf(loop);
+    const layout = layoutOf(loop);
     const parameters: Record<string, Value> = {};
     const numbers = loop.parameters.map((parameter) => {
       const value = values[parameter.name] ?? parameter.value;
@@ -227,19 +242,41 @@ export class Engine {
     const refusal = found.outcome === "refused" ? whyRefused(found.refused, loop) : "";
     if (refusal && found.rows === 0) throw new Refusal(refusal);
     const happened = occurrences(events, found.happened, experiment);
+    const reducers = loop.measured.flatMap((place) => this.data.measured[place]);
+    const indices = new Set(reducers.flatMap(({ isIndex, gives }) => (isIndex ? gives : [])));
     const last = `t = ${general(experiment.time(found.refused.made), 12)} s`;
     return {
-      ...rowsOf(layout, copied(found.table, spare)),
-      actingRow: loop.actingRow,
+      rows: found.rows,
+      table: byColumns(found.table, found.rows, spare),
       parameters,
       happened,
-      metrics: found.metrics,
+      metrics: found.metrics.map((all) =>
+        Object.fromEntries(Object.entries(all).filter(([name]) => indices.has(name))),
+      ),
       messages: messages(loop, found.restarts),
+      cautions: this.cautions(loop, found.metrics, parameters),
       ...(refusal && { failure: `stopped at ${last}: ${refusal}` }),
       ...(found.outcome === "ended" && {
         remark: `ended at ${last}: ${whyEnded(events, happened)}`,
       }),
     };
+  }
+
+  /** Returns the warnings of all rules, each once. */
+  private cautions(loop: LoopData, found: readonly Metrics[], parameters: Values): string[] {
+    const texts = this.data.rules.flatMap(({ number, above, text }) =>
+      loop.vehicles.flatMap((vehicle, place) => {
+        const numbers = found[place];
+        if (!(numbers[number]?.[0] > above)) return [];
+        const filled = text.replace(FIELD, (_, name: string, digits?: string) => {
+          const own = namedFor(vehicle, name);
+          if (digits === undefined) return own;
+          return general(Number(numbers[name]?.[0] ?? parameters[own]), Number(digits) || 6);
+        });
+        return [filled];
+      }),
+    );
+    return [...new Set(texts)];
   }
 
   /** Returns the reducers of a vehicle's indices. */
@@ -258,12 +295,6 @@ export class Engine {
       gives,
     }));
   }
-
-  private layoutOf(loop: LoopData): Layout {
-    const known = this.layouts.get(loop) ?? layoutOf(loop);
-    this.layouts.set(loop, known);
-    return known;
-  }
 }
 
 /** Names of a loop, and their numbers. */
@@ -274,7 +305,15 @@ interface Layout extends Places {
   readonly faults: ReadonlyMap<number, string>;
 }
 
-function layoutOf({ ports, parameters }: LoopData): Layout {
+const layouts = new WeakMap<LoopData, Layout>();
+
+function layoutOf(loop: LoopData): Layout {
+  const known = layouts.get(loop) ?? laidOut(loop);
+  layouts.set(loop, known);
+  return known;
+}
+
+function laidOut({ ports, parameters }: LoopData): Layout {
   const names: string[] = [];
   const inputs: string[] = [];
   const faults = new Map<number, string>();
@@ -341,31 +380,58 @@ function messages({ restarted }: LoopData, restarts: Float64Array): string[] {
   );
 }
 
-/** Copies rows, if possible into the memory of a result that is no longer shown. */
-function copied(rows: Float64Array, spare: Result | undefined): Float64Array {
+/** Number of rows that are sorted into columns together, which fit into a cache. */
+const BLOCK = 32;
+
+/** Sorts rows into columns, one after the other, if possible in memory that is no longer used. */
+function byColumns(
+  table: Float64Array,
+  rows: number,
+  spare?: ArrayBuffer,
+): Float64Array<ArrayBuffer> {
   // Writing to fresh memory takes longer than all steps.
-  const free = spare?.table.buffer;
-  const isFit = free instanceof ArrayBuffer && free.byteLength === REAL * rows.length;
-  const table = isFit ? new Float64Array(free) : new Float64Array(rows.length);
-  table.set(rows);
-  return table;
+  const isFit = spare?.byteLength === table.byteLength;
+  const columns = isFit ? new Float64Array(spare) : new Float64Array(table.length);
+  const width = rows && table.length / rows;
+  for (let first = 0; first < rows; first += BLOCK) {
+    const last = Math.min(rows, first + BLOCK);
+    for (let i = 0; i < width; i++) {
+      for (let k = first; k < last; k++) columns[i * rows + k] = table[k * width + i];
+    }
+  }
+  return columns;
 }
 
-/** Returns the columns of a table of rows; a column is copied when it is first read. */
-function rowsOf({ names, faults, columns }: Layout, table: Float64Array) {
-  const width = 1 + names.length;
-  const rows = table.length / width;
-  const copies = new Map<string, Float64Array>();
-  const column = (name: string) => {
-    const known = copies.get(name);
-    if (known !== undefined) return known;
-    const place = name === "time" ? 0 : 1 + (columns.get(name) ?? Number.NaN);
-    if (Number.isNaN(place)) throw new Error(`there is no column ${name}`);
-    const values = new Float64Array(rows);
-    for (let k = 0; k < rows; k++) values[k] = table[k * width + place];
-    copies.set(name, values);
-    return values;
+/** Returns access by name to columns of a table that follow each other, the time first. */
+export function columnsOf(
+  names: readonly string[],
+  placeOf: (name: string) => number | undefined,
+  columns: (place: number) => Float64Array,
+): Pick<Run, "columns" | "time" | "column" | "has"> {
+  return {
+    columns: names,
+    time: columns(0),
+    has: (name) => placeOf(name) !== undefined,
+    column(name) {
+      const place = placeOf(name);
+      if (place === undefined) throw new Error(`there is no column ${name}`);
+      return columns(1 + place);
+    },
   };
-  const has = (name: string) => columns.has(name);
-  return { columns: names, faults, rows, table, time: column("time"), has, column };
+}
+
+/** Returns what a run of a loop has left, with access to its columns. */
+export function resultOf(loop: LoopData, outcome: Outcome): Result {
+  const { names, faults, columns } = layoutOf(loop);
+  const { rows, table } = outcome;
+  return {
+    ...outcome,
+    ...columnsOf(
+      names,
+      (name) => columns.get(name),
+      (place) => table.subarray(place * rows, (place + 1) * rows),
+    ),
+    actingRow: loop.actingRow,
+    faults,
+  };
 }

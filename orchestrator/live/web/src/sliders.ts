@@ -1,5 +1,6 @@
 // Sliders: their parameters and headings, and the values of their positions.
 
+import { namedFor } from "./settings";
 import type { VehicleData } from "./types";
 
 /** Positions of a slider, from 0. */
@@ -15,8 +16,10 @@ interface Scale {
 }
 
 export interface Slider {
-  /** HTML. */
-  readonly label: string;
+  /** Symbol or member in HTML, after the words; empty: words only. */
+  readonly symbol: string;
+  /** Words in place of the description of its first parameter. */
+  readonly words?: string;
   /** Text for screen readers, for a slider that sets several parameters. */
   readonly spoken?: string;
   /** Parameters that the slider sets together; each also has a field. */
@@ -35,18 +38,26 @@ interface Group {
 const by = (low: number, high: number): Scale => ({ low, high, log: true });
 const from = (low: number, high: number): Scale => ({ low, high });
 
-function row(label: string, name: string, scale: Scale): Slider {
-  return { label, names: [name], scale };
+function row(symbol: string, name: string, scale: Scale): Slider {
+  return { symbol, names: [name], scale };
 }
 
-function diagonal(label: string, name: string): Slider {
+function diagonal(symbol: string, name: string): Slider {
   const all = `controller.${name}`;
-  return { label, spoken: all, names: [1, 2, 3].map((k) => `${all}[${k}]`), scale: by(0.1, 1000) };
+  return { symbol, spoken: all, names: [1, 2, 3].map((k) => `${all}[${k}]`), scale: by(0.1, 1000) };
 }
 
-function limit(member: string): Slider {
+/** Limited commands, in words. */
+const LIMITS = [
+  ["u", "Largest surge force"],
+  ["q", "Largest pitch moment"],
+  ["r", "Largest yaw moment"],
+];
+
+function limit([member, words]: readonly string[]): Slider {
   return {
-    label: `&tau;<sub>${member}</sub>`,
+    symbol: `&tau;<sub>${member}</sub>`,
+    words,
     spoken: `limits of plant.tau.${member}`,
     names: [`plant.tau_min.${member}`, `plant.tau_max.${member}`],
     signs: [-1, 1],
@@ -86,7 +97,7 @@ export const GROUPS: readonly Group[] = [
       row("&epsilon;<sub><i>t</i></sub>", "controller.eps_t", by(0.01, 100)),
     ],
   },
-  { title: "Limits of the actuators", rows: ["u", "q", "r"].map(limit) },
+  { title: "Limits of the actuators", rows: LIMITS.map(limit) },
   { title: "Start of the vehicle", rows: posture("plant", -20, 20) },
   {
     title: "Reference",
@@ -94,8 +105,8 @@ export const GROUPS: readonly Group[] = [
       ...posture("planner", -100, 100),
       ...members("&tau;", "planner.tau_d", "u", from(0, 50)),
       ...members("&tau;", "planner.tau_d", "qr", from(-10, 10)),
-      row("cruising speed", "planner.cruise", from(0.1, 2)),
-      row("rounding", "planner.rounding", from(0.5, 15)),
+      row("", "planner.cruise", from(0.1, 2)),
+      row("", "planner.rounding", from(0.5, 15)),
     ],
   },
   {
@@ -108,8 +119,8 @@ export const GROUPS: readonly Group[] = [
   {
     title: "Noise",
     rows: [
-      row("standard deviation", "plant.noise.std", { low: 1e-5, high: 1, log: true, zero: true }),
-      row("seed", "plant.noise.seed", { low: 1, high: 100, whole: true }),
+      row("", "plant.noise.std", { low: 1e-5, high: 1, log: true, zero: true }),
+      row("", "plant.noise.seed", { low: 1, high: 100, whole: true }),
     ],
   },
   {
@@ -122,24 +133,25 @@ export const GROUPS: readonly Group[] = [
         ["x", "north"],
         ["y", "east"],
         ["z", "down"],
-      ].map(([axis, way]) => row(`current ${way}`, `plant.current.${axis}`, from(-1, 1))),
+      ].map(([axis, way]) => row(way, `plant.current.${axis}`, from(-1, 1))),
     ],
   },
 ];
 
 /** Returns a slider for the components of a vehicle; `GROUPS` has the names of a single vehicle. */
 export function sliderOf(vehicle: VehicleData, slider: Slider): Slider {
-  const names = { ...vehicle, plant: vehicle.vehicle };
-  const named = (text: string) =>
-    text.replace(/\b(plant|controller|planner|disturbance)(?=\.)/, (role) => {
-      return names[role as keyof typeof names];
-    });
+  const named = (text: string) => namedFor(vehicle, text);
   const { spoken } = slider;
   return {
     ...slider,
     names: slider.names.map(named),
     ...(spoken === undefined ? {} : { spoken: named(spoken) }),
   };
+}
+
+/** Returns the first words of a description: without a symbol, remark or member. */
+export function firstWords(description: string): string {
+  return description.split(/ \(|[,;:.] /, 1)[0];
 }
 
 /** Returns the value at a position, with no more digits than positions can distinguish. */

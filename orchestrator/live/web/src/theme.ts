@@ -10,6 +10,7 @@ export interface Palette {
   /** Colour of the upper fin. */
   highlight: Colour;
   grid: Colour;
+  text: Colour;
 }
 
 /** Values read since the theme last changed: charts need them often. */
@@ -41,16 +42,18 @@ export function vehicleColour(text: string): Colour {
   return mixed(parsed(text), [1, 1, 1], Number.parseFloat(property("--lighter")) / 100);
 }
 
-/** Share of the text's colour in the second controller's, if both have a vehicle's colour. */
-const SECOND = 0.35;
-
-/** Gives the lines of all controllers a vehicle's colour; undefined: each its own. */
+/**
+ * Gives the lines of the first controller a vehicle's colour, and lines of the second the colour of
+ * text; undefined: each its own.
+ */
 export function colourLines(text: string | undefined): void {
   known.clear();
   const { style } = document.documentElement;
-  for (const [name, share] of Object.entries({ "--first": 0, "--second": SECOND })) {
-    if (text === undefined) style.removeProperty(name);
-    else style.setProperty(name, written(mixed(vehicleColour(text), colour("--text"), share)));
+  if (text === undefined) {
+    for (const name of ["--first", "--second"]) style.removeProperty(name);
+  } else {
+    style.setProperty("--first", written(vehicleColour(text)));
+    style.setProperty("--second", property("--text"));
   }
   known.clear();
 }
@@ -67,6 +70,7 @@ export function palette(): Palette {
     reference: colour("--reference"),
     highlight: colour("--highlight"),
     grid: colour("--grid"),
+    text: colour("--text"),
   };
 }
 

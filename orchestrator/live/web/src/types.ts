@@ -162,10 +162,11 @@ export interface IndexData {
   readonly meaning: string;
 }
 
-/** A reducer, which makes indices of a vehicle from rows. */
+/** A reducer, which makes indices of a vehicle from rows, or numbers for rules. */
 export interface ReducerData {
   /** Name in the module. */
   readonly name: string;
+  readonly isIndex: boolean;
   /** Names of columns and parameters, or constants. */
   readonly takes: readonly (string | number)[];
   /** Name of the index of each result. */
@@ -188,6 +189,16 @@ export interface Common {
   readonly hull: Hull;
 }
 
+/** A rule for a warning. */
+interface RuleData {
+  /** Result of a reducer. */
+  readonly number: string;
+  /** Value above which it warns. */
+  readonly above: number;
+  /** `{name}` is the name of a parameter; `{name:g}` its value, or another result. */
+  readonly text: string;
+}
+
 /** Data of the live page, besides the script and modules. */
 export interface Data extends Common {
   /** The preset that is shown first. */
@@ -197,6 +208,7 @@ export interface Data extends Common {
   readonly presets: readonly Preset[];
   /** Indices of vehicles. */
   readonly measured: readonly (readonly ReducerData[])[];
+  readonly rules: readonly RuleData[];
 }
 
 /** Beginning or end of an event in a run. */
@@ -228,18 +240,28 @@ export interface Run {
   readonly metrics: readonly Metrics[];
 }
 
-/** A run that the page has made: rows at t = 0 and after each step, and all ports but `faults`. */
-export interface Result extends Run {
-  /** Outputs that are 0 in every row, by the number of columns before them in result.csv. */
-  readonly faults: ReadonlyMap<number, string>;
-  /** Row by row: the time, then the columns. */
-  readonly table: Float64Array;
+/** Rows and messages of a run that the page has made, as plain data. */
+export interface Outcome {
+  readonly rows: number;
+  /** Columns one after the other, the time first. */
+  readonly table: Float64Array<ArrayBuffer>;
+  readonly parameters: Values;
+  readonly happened: readonly Occurrence[];
+  readonly metrics: readonly Metrics[];
   /** Messages of components, `controller: ...`. */
   readonly messages: readonly string[];
+  /** Warnings about valid but misleading numbers. */
+  readonly cautions: readonly string[];
   /** Why the run failed; it keeps the rows before that. */
   readonly failure?: string;
   /** Why it ended early without a failure. */
   readonly remark?: string;
+}
+
+/** A run that the page has made: rows at t = 0 and after each step, and all ports but `faults`. */
+export interface Result extends Run, Outcome {
+  /** Outputs that are 0 in every row, by the number of columns before them in result.csv. */
+  readonly faults: ReadonlyMap<number, string>;
 }
 
 /** Options of a run. */
@@ -249,8 +271,8 @@ export interface Options {
   /** [s] */
   readonly step: number;
   readonly events?: readonly EventData[];
-  /** A result that is no longer shown, whose memory the run may reuse. */
-  readonly spare?: Result | undefined;
+  /** Memory of a table that is no longer shown, which the run may reuse. */
+  readonly spare?: ArrayBuffer | undefined;
 }
 
 /** Members of each index, by index, in the order of `IndexData.units`. */

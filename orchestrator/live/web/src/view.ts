@@ -5,30 +5,29 @@ import { element, sayFailure, unpacked } from "./dom";
 import { buildSwitches } from "./legend";
 import { longest } from "./panels";
 import { fleetOf } from "./settings";
+import { columnsOf } from "./simulate";
 import type { Run, StoredData, StoredRun } from "./types";
 
 /** Reads a stored run: its columns one after the other, the time first. */
 function runOf(stored: StoredRun, content: ArrayBuffer): Run {
   const { rows, doubles, singles } = stored;
-  const columns = new Map<string, Float64Array>();
-  const time = new Float64Array(content, 0, rows);
-  doubles.forEach((name, k) => {
-    columns.set(name, new Float64Array(content, (1 + k) * time.byteLength, rows));
-  });
-  const start = (1 + doubles.length) * time.byteLength;
-  singles.forEach((name, k) => {
-    columns.set(name, Float64Array.from(new Float32Array(content, start + 4 * k * rows, rows)));
-  });
+  const names = [...doubles, ...singles];
+  const places = new Map(names.map((name, place) => [name, place]));
+  const wide = 1 + doubles.length;
+  const start = 8 * wide * rows;
+  const columns = [
+    ...Array.from({ length: wide }, (_, k) => new Float64Array(content, 8 * k * rows, rows)),
+    ...singles.map((_, k) =>
+      Float64Array.from(new Float32Array(content, start + 4 * k * rows, rows)),
+    ),
+  ];
   return {
     ...stored,
-    columns: [...doubles, ...singles],
-    time,
-    has: (name) => columns.has(name),
-    column(name) {
-      const found = columns.get(name);
-      if (found === undefined) throw new Error(`there is no column ${name}`);
-      return found;
-    },
+    ...columnsOf(
+      names,
+      (name) => places.get(name),
+      (place) => columns[place],
+    ),
   };
 }
 
@@ -57,6 +56,7 @@ async function start(): Promise<void> {
   element("toolbar").hidden = data.loops.length < 2 && fleet.length < 2;
   element("stage").hidden = fleet.length === 0;
   element("results").hidden = element("indices").querySelector("td") === null;
+  display.start();
   document.body.classList.add("started");
 }
 

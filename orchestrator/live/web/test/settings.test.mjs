@@ -3,12 +3,12 @@ import assert from "node:assert/strict";
 import test from "node:test";
 import { data, fleet, load, preset } from "./load.mjs";
 
-const { fromHash, toHash } = await load("link");
+const { fromHash, suggested, toHash } = await load("link");
 const { untouched, withEdit, withValues, eventsOf } = await load("settings");
 const { commandLine, toToml } = await load("command");
 const { parted } = await load("simulate");
 const { names } = await load("controls");
-const { GROUPS, sliderOf } = await load("sliders");
+const { firstWords, GROUPS, sliderOf } = await load("sliders");
 
 const start = untouched(preset);
 
@@ -78,6 +78,22 @@ test("invalid fields of a link are listed and ignored", () => {
   );
   assert.deepEqual(settings, start);
   assert.deepEqual(unknown, ["preset=no", "controller.eps_t=x", "plant.lost=1", "stop_time="]);
+});
+
+test("names that are not understood get suggestions, and values do not", () => {
+  const said = (field) => suggested(field, start, data);
+  assert.equal(said("kd=5"), "kd=5; did you mean controller.k_d?");
+  assert.equal(said("controller.epst=5"), "controller.epst=5; did you mean controller.eps_t?");
+  assert.equal(said("stoptime=5"), "stoptime=5; did you mean stop_time?");
+  assert.equal(said("preset=flet"), "preset=flet; did you mean fleet?");
+  assert.equal(said("hide=pd"), "hide=pd; did you mean PD?");
+  assert.equal(said("controller.k_d=x"), "controller.k_d=x");
+  assert.equal(said("something=else"), "something=else");
+});
+
+test("a link may ask for a time", () => {
+  assert.deepEqual(fromHash("#time=12.5", data), { settings: start, unknown: [], time: 12.5 });
+  assert.deepEqual(fromHash("#time=-1", data).unknown, ["time=-1"]);
 });
 
 test("a controller is hidden once, and a second preset is listed as unknown", () => {
@@ -209,6 +225,19 @@ test("a message names the parameter of one vehicle only", () => {
   assert.ok(!names(said, "auv1.plant.m1"));
   assert.ok(names("plant: m11 = -1", "plant.m11"));
   assert.ok(names("auv1.plant.m11: not a number", "auv1.plant.m11"));
+});
+
+test("a slider is called by the first words of a description", () => {
+  const words = {
+    "Gain of the observer (k_d)": "Gain of the observer",
+    "Gain of the adaptation, in SI units (gamma)": "Gain of the adaptation",
+    "Ocean current in the earth frame; not in the paper: x": "Ocean current in the earth frame",
+    "Initial posture: phi": "Initial posture",
+    "Seed of the noise": "Seed of the noise",
+  };
+  for (const [description, wanted] of Object.entries(words)) {
+    assert.equal(firstWords(description), wanted);
+  }
 });
 
 test("sliders set the parameters of their vehicle", () => {

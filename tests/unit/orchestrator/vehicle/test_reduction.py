@@ -180,13 +180,12 @@ def test_a_parameter_that_is_not_a_number_is_refused():
 def test_compiled_indices_equal_their_hooks_in_python(order, blocks, monkeypatch):
     reducers = [*dict.fromkeys(index.reducer for index in INDICES), *WATCHED]
     names = sorted({port.name for reducer in reducers for port in reducer.ports})
-    signals = [name for name in names if name not in STANDARD.limits and name != STANDARD.ell]
+    fixed = {STANDARD.ell: 0.3, "plant.roll": False}
+    signals = [name for name in names if name not in (*STANDARD.limits, *fixed)]
     random = np.random.default_rng(7)
     values = np.column_stack((0.5 * np.arange(N) - 1.0, random.normal(size=(N, len(signals)))))
     limits = dict.fromkeys(STANDARD.lower_limits, -1.0) | dict.fromkeys(STANDARD.upper_limits, 0.5)
-    parameters = {
-        PortName.read(name): value for name, value in {**limits, STANDARD.ell: 0.3}.items()
-    }
+    parameters = {PortName.read(name): value for name, value in {**limits, **fixed}.items()}
     head = Header(tuple(signals), Experiment(9.0, 0.5, order, -1.0), parameters)
 
     def found() -> list[dict[str, list[float]]]:
