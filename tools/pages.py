@@ -502,7 +502,8 @@ def _value(action: argparse.Action) -> str:
     if action.nargs == 0:
         return ""
     if isinstance(action.metavar, str):
-        return action.metavar
+        is_optional = action.nargs == "?" and action.option_strings
+        return f"[{action.metavar}]" if is_optional else action.metavar
     return "|".join(map(str, action.choices)) if action.choices else action.dest.upper()
 
 

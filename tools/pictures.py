@@ -23,7 +23,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 from PIL import Image, ImageOps
 
 from orchestrator.commands.main import main as auv_fmu
-from orchestrator.figures.drawing import styled
+from orchestrator.figures.drawing import SETTINGS, styled
 from orchestrator.figures.run_figures import (
     COMMANDS,
     DISTANCES,
@@ -34,7 +34,6 @@ from orchestrator.figures.run_figures import (
 )
 from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.study_values import Values
-from orchestrator.figures.style import SETTINGS
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.result import read_result
 from orchestrator.runs.scenario import Scenario, names, read_scenario

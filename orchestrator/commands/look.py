@@ -8,6 +8,8 @@ from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from orchestrator.commands.options import (
     add_options,
     add_set,
@@ -18,9 +20,10 @@ from orchestrator.commands.options import (
 )
 from orchestrator.commands.streams import OK, describe, say, show
 from orchestrator.cosim import Observer
-from orchestrator.figures.drawing import plot, save, told_apart, wanted_columns
-from orchestrator.figures.film import Film, animate
-from orchestrator.figures.style import Drawn
+from orchestrator.figures.drawing import one_figure, plot, save, told_apart, wanted_columns
+from orchestrator.figures.film import FILMS, Film, animate, default_ending
+from orchestrator.figures.run_figures import FIGURES, main_figure
+from orchestrator.figures.style import FIGURE_WIDTH, Drawn, Look
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.folder import VIEW, replace_files
@@ -48,8 +51,9 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
     """Add the options of `auv-fmu plot`."""
     describe(
         parser,
-        "Plot signals of stored results over time. Several results share the axes.",
-        "plot results/fig5 results/fig5/fig5-pd 'plant.y.*' --out y.png",
+        "Plot signals of stored results over time, or with --figure draw the figure of a scenario "
+        "again, for example for a paper. Several results share the axes.",
+        "plot results/fig5 --figure --width 3.5 --size 8 --out fig5.pdf",
     )
     parser.add_argument(
         "what",
@@ -58,6 +62,29 @@ def add_plot(parser: argparse.ArgumentParser) -> None:
         help="result folders or tables, and patterns of signals such as plant.y.*; default "
         "patterns: errors, commands and estimates",
     )
+    parser.add_argument(
+        "--figure", nargs="?", const="", metavar="NAME",
+        help="after the results: draw, instead of signals, the figure of the scenario with the run "
+        f"that it is compared with, or another: {', '.join(FIGURES)}",
+    )  # fmt: skip
+    parser.add_argument("--title", default="", metavar="TEXT", help="heading; default: none")
+    parser.add_argument(
+        "--label", action="append", default=[], metavar="NAME",
+        help="name of a run in the legend; repeat it for each run, in their order",
+    )  # fmt: skip
+    parser.add_argument(
+        "--width", type=float, metavar="IN",
+        help=f"width in inches, such as 3.5 for a column; default: {FIGURE_WIDTH:g}",
+    )  # fmt: skip
+    parser.add_argument(
+        "--font", default="", metavar="NAME",
+        help="font, such as serif or 'Times New Roman'; default: DejaVu Sans",
+    )  # fmt: skip
+    parser.add_argument("--size", type=float, metavar="PT", help="size of texts; default: 10")
+    parser.add_argument(
+        "--style", default="", metavar="FILE.mplstyle",
+        help="style of matplotlib, or the name of one, applied over auv_fmu.figures; default: none",
+    )  # fmt: skip
     _add_file(parser, "image to write: .png, .svg or .pdf; default: plot.png", Path("plot.png"))
     parser.set_defaults(action=_plot)
 
@@ -106,20 +133,26 @@ def add_animate(parser: argparse.ArgumentParser) -> None:
     add_system(parser)
     add_options(parser, Request, "strict", "stop_time", "step", "order", "kind")
     add_set(parser)
-    fps, (width, height), _ = film = Film()
+    video, picture = FILMS[".mp4"], FILMS[".gif"]
+    sizes = " and ".join("{}x{} of {}".format(*film.size, ending) for ending, film in FILMS.items())
     parser.add_argument(
-        "--fps", type=int, default=fps, metavar="N",
-        help=f"number of frames per second; default: {fps}",
+        "--fps", type=int, metavar="N",
+        help=f"number of frames per second; default: {video.fps} of .mp4 and {picture.fps} of .gif",
     )  # fmt: skip
     parser.add_argument(
-        "--size", type=_size, default=film.size, metavar="WIDTHxHEIGHT",
-        help=f"size of the picture in pixels; default: {width}x{height}",
+        "--size", type=_size, metavar="WIDTHxHEIGHT",
+        help=f"size of the picture in pixels; default: {sizes}",
     )  # fmt: skip
     parser.add_argument(
         "--speed", type=float, metavar="X",
-        help="seconds of the run in a second of the film; default: the film lasts 10 s",
+        help="seconds of the run in a second of the film; default: 1 of .mp4, which is real time; "
+        "a .gif lasts 10 s",
     )  # fmt: skip
-    _add_file(parser, "film to write: .gif or .mp4; default: results/SCENARIO.gif")
+    _add_file(
+        parser,
+        "film to write: .mp4 or .gif; default: results/SCENARIO.mp4, or .gif where ffmpeg is not "
+        "installed",
+    )
     parser.set_defaults(action=_animate)
 
 
@@ -143,24 +176,30 @@ def _plot(options: argparse.Namespace) -> int:
     patterns = [text for text in options.what if not _is_there(text)]
     if not paths:
         raise InputError(f"{patterns[0]}: no such result; give the folder or the table of a run")
-    columns = partial(wanted_columns, patterns=patterns)
-    runs = _named([read_result(path, columns) for path in paths], paths)
-    figure = plot(told_apart(runs, paths), patterns)
+    look = Look(options.width, options.font, options.size, options.style)
+    if options.figure is None:
+        columns = partial(wanted_columns, patterns=patterns)
+        runs = [read_result(path, columns) for path in paths]
+        runs = told_apart(runs, paths, options.label)
+        figure = plot(runs, patterns, options.title, look)
+    else:
+        if patterns:
+            raise InputError(f"{patterns[0]}: no such result; with --figure there are no patterns")
+        figure = _figure_of(paths, options, look)
     with _written(options.out, options.force) as folder:
         save(figure, folder / options.out.name)
     return OK
 
 
-def _named(runs: Sequence[Drawn], paths: Sequence[Path]) -> list[Drawn]:
-    """Label runs by their labels, or by their scenarios if labels are missing or the same."""
-    records = [read_record(table_in(path)) for path in paths]
-    labels = {record.get("label") for record in records} - {"", None}
-    if len(labels) == len(runs):
-        return list(runs)
-    return [
-        run._replace(label=str(record.get("scenario") or run.label))
-        for run, record in zip(runs, records, strict=True)
-    ]
+def _figure_of(paths: Sequence[Path], options: argparse.Namespace, look: Look) -> Figure:
+    """Draw the figure of a scenario, with the runs that a single result is compared with."""
+    files = [table_in(path) for path in paths]
+    if len(files) == 1:
+        files += companion_tables(files[0])
+    runs = told_apart([read_result(file) for file in files], files, options.label)
+    record = read_record(files[0])
+    name = options.figure or main_figure(str(record.get("figure", "tracking")), runs[0].loops)
+    return one_figure(name, options.title, runs, look=look)
 
 
 def _is_there(text: str) -> bool:
@@ -220,8 +259,11 @@ def _live(options: argparse.Namespace) -> int:
 
 def _animate(options: argparse.Namespace) -> int:
     scenario, system = read_system(options)
-    out = options.out or Path("results", f"{scenario.stem}.gif")
-    film = Film(options.fps, options.size, options.speed)
+    out = options.out or Path("results", f"{scenario.stem}{default_ending()}")
+    given = {name: vars(options)[name] for name in Film._fields}
+    film = FILMS.get(out.suffix, Film())._replace(
+        **{name: value for name, value in given.items() if value is not None}
+    )
     film.check(out)
     prepared = prepare(scenario, system, request(options))
     loops = prepared.loops
@@ -233,7 +275,9 @@ def _animate(options: argparse.Namespace) -> int:
         for loop in loops:
             if missing := seen.missing(*loop.for_control_point()):
                 raise InputError(f"{options.scenario}: has no vehicle to show: no {missing[0]}")
-        animate(scenario.title or scenario.name, run, folder / out.name, film)
+        # A title may name both runs of a comparison.
+        shown = f" (shown: {scenario.label})" if scenario.compare and scenario.label else ""
+        animate(f"{scenario.title or scenario.name}{shown}", run, folder / out.name, film)
     return status(scenario.name, ending)
 
 

@@ -1,6 +1,6 @@
 """Figures of runs, drawn by matplotlib: those that scenarios name, and plots of any signals.
 
-Settings are :data:`.SETTINGS`, whatever a matplotlibrc contains, and files contain no date. Code
+Settings are :data:`SETTINGS`, whatever a matplotlibrc contains, and files contain no date. Code
 that only looks figures up imports :mod:`.run_figures`, which needs no matplotlib.
 """
 
@@ -22,12 +22,15 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties, findfont, fontManager
 from matplotlib.lines import Line2D
 from tqdm import tqdm
 
+import auv_fmu
 from orchestrator.cosim import Table
 from orchestrator.figures.run_figures import (
     FIGURES,
+    FLEET,
     MOST_DRAWN,
     Cell,
     Panel,
@@ -41,17 +44,30 @@ from orchestrator.figures.style import (
     COLOURS,
     FIGURE_FORMATS,
     FIGURE_WIDTH,
-    SETTINGS,
     STYLES,
     Drawn,
+    Look,
     escape_math,
     heading,
     printed_unit,
+    text_scale,
+    widths_of_text,
 )
 from orchestrator.figures.visible import draw_signal
-from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.machine.texts import matches, matching
 from orchestrator.vehicle.signals import Loop
+
+#: The project's style, which a user may take too: `plt.style.use("auv_fmu.figures")`.
+SETTINGS: Any = mpl.rc_params_from_file(
+    Path(auv_fmu.__file__).with_name("figures.mplstyle"), use_default_template=False
+)
+
+#: Settings with which matplotlib does not lay out a figure again.
+_LAID_OUT: Any = {"figure.constrained_layout.use": False}
+
+#: Least and largest width of a figure [in], and size of its texts [pt].
+_WIDTHS, _TEXT_SIZES = (2.0, 40.0), (4.0, 40.0)
 
 #: Metadata that would name the time or the tool, by the ending of the file.
 _NO_DATE: dict[str, Any] = {
@@ -60,15 +76,23 @@ _NO_DATE: dict[str, Any] = {
     ".pdf": {"CreationDate": None},
 }
 
-#: Heights of a heading and of a row of a legend, of a panel of a plot, and of the margins of a plot
-#: above and below its panels [in].
+#: Heights of a row of a heading and of a legend, of a panel of a plot, and of the margins of a plot
+#: above and below its panels, with texts of 10 pt [in].
 _HEADING, _ROW, _PANEL, _MARGIN = 0.3, 0.2, 1.9, 0.6
 
-#: Largest number of groups in a plot without patterns.
+#: Characters in a row of a heading and of a legend, per size of text of its width; characters that
+#: are as wide as the line of an entry.
+_HEADING_LETTERS, _LETTERS, _LINE = 1.42, 1.93, 7
+
+#: Least width of panels that are side by side, as a multiple of the size of their texts, and their
+#: height below each other as a share of the usual one, so that a column of a page holds them.
+_ABREAST, _FLATTER = 24.0, 0.72
+
+#: Largest number of panels of a plot without patterns.
 _MOST_PANELS = 12
 
-#: Characters in a row of a heading, in a row of a legend, and as wide as the line of an entry.
-_HEADING_LETTERS, _LETTERS, _LINE = 74, 100, 6
+#: Characters of a name as long as a panel is high.
+_LONG_NAME = 20
 
 #: Largest number of parameters, or of events, in the labels of runs.
 _FEW = 2
@@ -78,7 +102,16 @@ _STYLES = (*STYLES, (0, (7, 2)), (0, (3, 1, 1, 1, 1, 1)))
 
 
 class Plot(Figure):
-    """A figure that a notebook shows by itself."""
+    """A figure that keeps its look, and that a notebook shows by itself."""
+
+    look = Look()
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """Write the figure, without time and tool: equal runs give equal files."""
+        suffix = Path(fname).suffix if isinstance(fname, str | Path) else ""
+        options.setdefault("metadata", _NO_DATE.get(suffix))
+        with styled(self.look), mpl.rc_context(_LAID_OUT):
+            super().savefig(fname, **options)
 
     def _repr_png_(self) -> bytes:
         image = BytesIO()
@@ -87,35 +120,119 @@ class Plot(Figure):
 
 
 @contextmanager
-def styled() -> Iterator[None]:
-    """Draw with :data:`.SETTINGS` only, and without matplotlib's warnings."""
+def styled(look: Look = Look()) -> Iterator[None]:  # noqa: B008
+    """Draw with :data:`SETTINGS` and a look only, and without matplotlib's warnings.
+
+    Raises:
+        InputError: there is no such font or style, or a size is out of range.
+
+    """
     log = logging.getLogger("matplotlib")
     level = log.level
-    log.setLevel(logging.ERROR)
     try:
         with mpl.rc_context(), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             mpl.rcdefaults()
             mpl.rcParams.update(SETTINGS)
+            mpl.rcParams["figure.figsize"] = (FIGURE_WIDTH, FIGURE_WIDTH)
+            log.setLevel(logging.WARNING)
+            _apply(look, log)
+            log.setLevel(logging.ERROR)
             yield
     finally:
         log.setLevel(level)
+
+
+def _apply(look: Look, log: logging.Logger) -> None:
+    """Change the settings of matplotlib to a look."""
+    if look.style:
+        _apply_style(look, log)
+    if look.width is not None:
+        _check_range("width", look.width, _WIDTHS, "in")
+        mpl.rcParams["figure.figsize"] = (look.width, look.width)
+    if look.size is not None:
+        _check_range("size", look.size, _TEXT_SIZES, "pt")
+        mpl.rcParams["font.size"] = look.size
+    if look.font:
+        _check_font(look.font)
+        mpl.rcParams.update(
+            {
+                "font.family": look.font,
+                "mathtext.fontset": "custom",
+                "mathtext.rm": look.font,
+                "mathtext.it": f"{look.font}:italic",
+                "mathtext.bf": f"{look.font}:bold",
+            }
+        )
+
+
+def _apply_style(look: Look, log: logging.Logger) -> None:
+    """Apply a style of matplotlib, whose problems are only in its log."""
+    # It reads all styles.
+    from matplotlib import style  # noqa: PLC0415
+
+    problems = _Problems()
+    log.addHandler(problems)
+    log.propagate = False
+    try:
+        style.use(look.style)  # type: ignore[arg-type]
+    except OSError as error:
+        raise InputError(f"style {look.style}: no such file, and no style of matplotlib") from error
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"style: {reason(error)}") from error
+    finally:
+        log.removeHandler(problems)
+        log.propagate = True
+    if problems.lines:
+        raise InputError(f"style: {problems.lines[0]}")
+
+
+class _Problems(logging.Handler):
+    """The first line of each warning."""
+
+    def __init__(self) -> None:
+        super().__init__(logging.WARNING)
+        self.lines: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self.lines.append(record.getMessage().strip().splitlines()[0])
+
+
+def _check_range(name: str, value: float, ends: tuple[float, float], unit: str) -> None:
+    least, most = ends
+    if not least <= value <= most:
+        raise InputError(f"{name} {value:g}: must be from {least:g} to {most:g} {unit}")
+
+
+def _check_font(font: str) -> None:
+    try:
+        findfont(FontProperties(family=font), fallback_to_default=False)
+    except ValueError as error:
+        hint = did_you_mean(font, fontManager.get_font_names())
+        raise InputError(
+            f"font {font!r} is not installed"
+            + (hint or "; DejaVu Sans and DejaVu Serif always are")
+        ) from error
 
 
 def save(figure: Figure, *paths: Path) -> None:
     """Write a figure without time and tool, so that equal runs give equal files.
 
     Raises:
-        InputError: values are too large for the axes.
+        InputError: values are too large for the axes, or the figure's style asks for LaTeX, which
+            is not there.
 
     """
-    with styled(), mpl.rc_context({"figure.constrained_layout.use": False}):
+    look = figure.look if isinstance(figure, Plot) else Look()
+    with styled(look), mpl.rc_context(_LAID_OUT):
         # One layout for all files.
         if (engine := figure.get_layout_engine()) is not None:
             try:
                 engine.execute(figure)
             except (ValueError, OverflowError) as error:
                 raise InputError("values are too far apart to draw") from error
+            except RuntimeError as error:
+                raise InputError(f"no figure: {reason(error)}") from error
         figure.set_layout_engine(None)
         for path in paths:
             figure.savefig(path, metadata=_NO_DATE[path.suffix])
@@ -124,21 +241,35 @@ def save(figure: Figure, *paths: Path) -> None:
 # Legends
 
 
-def _legend_columns(lines: Sequence[Line2D]) -> int:
+def _legend_columns(figure: Figure, lines: Sequence[Line2D]) -> int:
     longest = max(len(str(line.get_label())) for line in lines)
-    return max(1, _LETTERS // (longest + _LINE))
+    return max(1, int(_LETTERS * widths_of_text(figure)) // (longest + _LINE))
+
+
+def _heading_lines(figure: Figure, title: str) -> str:
+    """Break a heading into lines."""
+    return textwrap.fill(title, int(_HEADING_LETTERS * widths_of_text(figure)))
 
 
 def _name_lines(figure: Figure, lines: Sequence[Line2D], title: str = "") -> None:
     """Add a legend above all panels, with the heading in it, and make the figure higher for it."""
-    columns = _legend_columns(lines)
-    figure.set_figheight(figure.get_figheight() + _ROW * -(-len(lines) // columns))
+    columns = _legend_columns(figure, lines)
+    text = _heading_lines(figure, title)
+    rows = -(-len(lines) // columns) * _ROW + (_HEADING * (1 + text.count("\n")) if text else 0.0)
+    figure.set_figheight(figure.get_figheight() + rows * text_scale())
     # A separate heading would overlap the legend.
     legend = figure.legend(
         handles=lines, loc="outside upper center", ncols=columns, title_fontsize="large",
-        title=heading(textwrap.fill(title, _HEADING_LETTERS)),
+        title=heading(text),
     )  # fmt: skip
     legend.get_title().set_multialignment("center")
+
+
+def _head(figure: Figure, title: str) -> None:
+    """Add a heading, and make the figure higher for it."""
+    text = _heading_lines(figure, title)
+    figure.set_figheight(figure.get_figheight() + _HEADING * (1 + text.count("\n")) * text_scale())
+    figure.suptitle(heading(text))
 
 
 def name_runs(figure: Figure, runs: Sequence[Drawn], title: str = "") -> None:
@@ -154,13 +285,19 @@ def name_runs(figure: Figure, runs: Sequence[Drawn], title: str = "") -> None:
 # Figures that scenarios name
 
 
-def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | None, list[str]]:
+def compose(
+    title: str,
+    rows: Rows,
+    runs: Sequence[Drawn],
+    look: Look = Look(),  # noqa: B008
+) -> tuple[Figure | None, list[str]]:
     """Draw the panels of a figure for which there are signals.
 
     Args:
         title: heading; empty for none.
-        rows: of the figure.
+        rows: of the figure; of a narrow one, the panels of a row are below each other.
         runs: the subject of the figure first.
+        look: of the figure.
 
     Returns:
         The figure, and a note on each panel that was left out; or None, and what is missing.
@@ -174,13 +311,18 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
     drawn = [kept for row in rows if (kept := [panel for panel in row if panel in shown])]
     if not drawn:
         return None, runs[0].lacks(panels[0].needs)
-    heights = [max(panel.height for panel in row) for row in drawn]
-    with styled():
-        figure = Plot(figsize=(FIGURE_WIDTH, sum(heights) + _HEADING * bool(title)))
+    with styled(look):
+        figure = _new_figure(look)
+        abreast = max(1, int(widths_of_text(figure) / _ABREAST))
+        is_narrow = any(len(row) > abreast for row in drawn)
+        drawn = [row[i : i + abreast] for row in drawn for i in range(0, len(row), abreast)]
+        scale = text_scale() * (_FLATTER if is_narrow else 1.0)
+        heights = [scale * max(panel.height for panel in row) for row in drawn]
+        figure.set_figheight(sum(heights))
         if len(runs) > 1 and not all(panel.of_one for panel in shown):
             name_runs(figure, runs, title)
         elif title:
-            figure.suptitle(heading(title), wrap=True)
+            _head(figure, title)
         columns = lcm(*map(len, drawn))
         grid = figure.add_gridspec(len(drawn), columns, height_ratios=heights)
         for i, row in enumerate(drawn):
@@ -189,6 +331,13 @@ def compose(title: str, rows: Rows, runs: Sequence[Drawn]) -> tuple[Figure | Non
                 panel.draw(Cell(figure, grid[i, j * width : (j + 1) * width]), runs)
         list_events(figure, runs)
     return figure, [note for panel in panels for note in _left_out(panel, runs)]
+
+
+def _new_figure(look: Look) -> Plot:
+    """Return a figure without panels, in a look that is in force."""
+    figure = Plot()
+    figure.look = look
+    return figure
 
 
 def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
@@ -202,17 +351,25 @@ def _left_out(panel: Panel, runs: Sequence[Drawn]) -> list[str]:
     ]
 
 
-def one_figure(name: str, title: str, runs: Sequence[Drawn], vehicle: str = "") -> Figure:
+def one_figure(
+    name: str,
+    title: str,
+    runs: Sequence[Drawn],
+    vehicle: str = "",
+    look: Look = Look(),  # noqa: B008
+) -> Figure:
     """Draw one figure.
 
     Args:
         name: key of :data:`FIGURES`, with the suffix of the figure's file.
         title: heading; empty for none.
         runs: the subject of the figure first, with labels that differ.
-        vehicle: to show; empty for the first.
+        vehicle: to show; empty for the first, or for all in the figure of several.
+        look: of the figure.
 
     Raises:
-        InputError: there is no such figure or vehicle, or the runs have nothing that it shows.
+        InputError: there is no such figure, vehicle, font or style, or the runs have nothing that
+            the figure shows.
 
     """
     known = {f"{key}{end}": rows for key, files in FIGURES.items() for end, rows in files.items()}
@@ -223,7 +380,8 @@ def one_figure(name: str, title: str, runs: Sequence[Drawn], vehicle: str = "") 
     if vehicle and vehicle not in loops:
         raise InputError(f"no vehicle {vehicle!r}; there are {', '.join(loops)}")
     loop = loops[vehicle] if vehicle else runs[0].loop
-    figure, missing = compose(title, known[name], _with_vehicle(runs, loop))
+    shown = runs if name == FLEET and not vehicle else _with_vehicle(runs, loop)
+    figure, missing = compose(title, known[name], shown, look)
     if figure is None:
         raise InputError(f"no figure: the run has no {missing[0]}")
     return figure
@@ -347,7 +505,12 @@ def _first_signals(runs: Sequence[Drawn], names: Sequence[str]) -> list[str]:
     return [name for name in shown if _group_of(name) in groups[:_MOST_PANELS]]
 
 
-def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
+def plot(
+    runs: Sequence[Drawn],
+    patterns: Sequence[str] = (),
+    title: str = "",
+    look: Look = Look(),  # noqa: B008
+) -> Figure:
     """Draw columns over time: a panel for each group such as plant.y, with all runs in it.
 
     Args:
@@ -355,9 +518,11 @@ def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
         patterns: such as `plant.y.*`, or the name of a group or column; none: errors, commands
             and estimates of the loops of all vehicles, or of other systems all that changes, in
             the first panels.
+        title: heading; empty for none.
+        look: of the figure.
 
     Raises:
-        InputError: a pattern matches no column.
+        InputError: a pattern matches no column, or there is no such font or style.
 
     """
     if not all(isinstance(pattern, str) for pattern in patterns):
@@ -373,11 +538,12 @@ def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
         # The members of a vector share a panel, whatever their units.
         unit = "" if name.endswith("]") else printed_unit(units.get(name, ""))
         panels.setdefault((_group_of(name), unit), []).append(name)
-    with styled():
-        figure = Plot(figsize=(FIGURE_WIDTH, _MARGIN + _PANEL * len(panels)))
+    with styled(look):
+        figure = _new_figure(look)
+        figure.set_figheight((_MARGIN + _PANEL * len(panels)) * text_scale())
         axes = figure.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
         has_means = [
-            _draw_group(place, group, unit, members, runs)
+            _draw_group(figure, place, group, unit, members, runs)
             for place, ((group, unit), members) in zip(axes, panels.items(), strict=True)
         ]
         over_time(list(axes), runs, any(has_means))
@@ -388,12 +554,19 @@ def plot(runs: Sequence[Drawn], patterns: Sequence[str] = ()) -> Figure:
                 _legend_line(run.label, COLOURS[i % len(COLOURS)] if in_colour else "black", i)
                 for i, run in enumerate(runs)
             ]
-            _name_lines(figure, lines)
+            _name_lines(figure, lines, title)
+        elif title:
+            _head(figure, title)
     return figure
 
 
 def _draw_group(
-    axes: Axes, group: str, unit: str, members: Sequence[str], runs: Sequence[Drawn]
+    figure: Figure,
+    axes: Axes,
+    group: str,
+    unit: str,
+    members: Sequence[str],
+    runs: Sequence[Drawn],
 ) -> bool:
     """Draw the members of a group; return true if there are means among the lines.
 
@@ -422,6 +595,8 @@ def _draw_group(
         whose = escape_math(lacking[0]) if len(lacking) == 1 else f"{len(lacking)} of the runs"
         axes.set_title(f"not in {whose}", loc="right", fontsize="small")
     name = group if len(members) > 1 else members[0]
+    if len(name) > _LONG_NAME:
+        name = ".\n".join(name.rsplit(".", 1))
     axes.set_ylabel(f"{name}\n[{unit}]" if unit else name)
     if len(members) > 1:
         lines = [
@@ -429,8 +604,9 @@ def _draw_group(
             for j, part in enumerate(parts)
         ]
         axes.legend(
-            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=_legend_columns(lines)
-        )
+            handles=lines, loc="lower left", bbox_to_anchor=(0.0, 1.0),
+            ncols=_legend_columns(figure, lines),
+        )  # fmt: skip
     return has_means
 
 
@@ -460,18 +636,34 @@ def _style(i: int) -> Any:
     return _STYLES[i % len(_STYLES)]
 
 
-def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[Drawn]:
+def told_apart(
+    runs: Sequence[Drawn], paths: Sequence[Path] = (), labels: Sequence[str] = ()
+) -> list[Drawn]:
     """Return runs with labels that differ.
 
-    The labels are the first of these that differ: their own, a few parameters, a few events, ends
-    of paths, numbers.
+    Without given labels, these are the first that differ: their own, if all have one, the names of
+    their scenarios, a few parameters, a few events, ends of paths, numbers.
 
     Args:
         runs: to draw together.
         paths: that they were read from.
+        labels: given ones; empty for none.
+
+    Raises:
+        InputError: not every run has a label of its own.
 
     """
+    if labels:
+        if isinstance(labels, str) or not all(isinstance(label, str) for label in labels):
+            raise InputError(f"labels are texts in a list, not {labels!r}")
+        if len(labels) != len(runs):
+            raise InputError(f"{len(labels)} labels for {len(runs)} runs: give one for each")
+        if len(set(labels)) != len(labels):
+            raise InputError(f"labels must differ: {', '.join(labels)}")
+        return [run._replace(label=label) for run, label in zip(runs, labels, strict=True)]
     names = [run.label for run in runs]
+    if len(set(names)) < len(names) or any(run.label == run.name for run in runs):
+        names = [run.name or run.label for run in runs]
     prefixes = [[name] * (len(set(names)) > 1) for name in names]
     # As texts: a record does not tell where the component ends in the name of a parameter.
     parameters = [
@@ -507,8 +699,8 @@ def told_apart(runs: Sequence[Drawn], paths: Sequence[Path] = ()) -> list[Drawn]
         *(["/".join(part[-n:]) for part in parts] for n in range(1, longest)),
         [f"{name} ({number})" for number, name in enumerate(names, start=1)],
     ]
-    labels = next(labels for labels in candidates if len(set(labels)) == len(labels))
-    return [run._replace(label=label) for run, label in zip(runs, labels, strict=True)]
+    chosen = next(labels for labels in candidates if len(set(labels)) == len(labels))
+    return [run._replace(label=label) for run, label in zip(runs, chosen, strict=True)]
 
 
 def _value_text(values: Mapping[str, Any], name: str) -> str:

@@ -57,10 +57,17 @@ _SHARE, _LENGTH = 0.2, 2.0
 _POINTS, _MOST_NAMED = 2000, 12
 
 #: Panels next to the scene with their shares of the height, for one vehicle and for several.
-_PANELS = {False: {ALL_ERRORS: 1, COMMANDS: 3}, True: {FLEET_ERRORS: 1, SMALLEST_DISTANCE: 1}}
+_PANELS = {False: {ALL_ERRORS: 2, COMMANDS: 3}, True: {FLEET_ERRORS: 1, SMALLEST_DISTANCE: 1}}
 
-#: Length of a film without a given speed [s], and pixels per inch of its figure.
-_DURATION, _DPI = 10.0, 90
+#: Length of a film without a given speed [s].
+_DURATION = 10.0
+
+#: Width and height of the figure of a film [in] of 16 : 9; others have as many pixels per inch as
+#: keep their texts as large.
+_FIGURE = 9.6, 5.4
+
+#: Options of ffmpeg: fast, and without visible loss.
+_ENCODING = ("-preset", "veryfast", "-crf", "20")
 
 #: Smallest and largest width and height [px].
 _SIZES = 200, 4000
@@ -77,12 +84,17 @@ class Film(NamedTuple):
     """
 
     fps: int = 20
-    size: tuple[int, int] = (756, 450)
+    size: tuple[int, int] = (960, 540)
     speed: float | None = None
+
+    @property
+    def dpi(self) -> float:
+        """Pixels per inch of its figure."""
+        return min(pixels / length for pixels, length in zip(self.size, _FIGURE, strict=True))
 
     def check(self, path: Path) -> None:
         """Raise an InputError if a film with these options cannot be written to a path."""
-        if path.suffix not in (".gif", ".mp4"):
+        if path.suffix not in FILMS:
             raise InputError(f"{path}: must end with .gif or .mp4")
         if path.suffix == ".mp4" and not FFMpegWriter.isAvailable():
             raise InputError(f"{path}: an .mp4 needs ffmpeg, which is not installed; write a .gif")
@@ -93,6 +105,15 @@ class Film(NamedTuple):
             raise InputError(f"--size: width and height must be from {least} to {most}")
         if self.speed is not None and not 0.0 < self.speed < inf:
             raise InputError(f"--speed {self.speed:g}: must be positive, and finite")
+
+
+#: Defaults by the ending of the file: a GIF has every pixel of every frame in it.
+FILMS = {".mp4": Film(25, (1920, 1080), 1.0), ".gif": Film()}
+
+
+def default_ending() -> str:
+    """Return .mp4 if ffmpeg is installed, else .gif."""
+    return ".mp4" if FFMpegWriter.isAvailable() else ".gif"
 
 
 class _Drawn(Figure):
@@ -120,24 +141,25 @@ def animate(text: str, run: Drawn, path: Path, film: Film) -> None:
     film.check(path)
     with styled():
         width, height = film.size
-        figure = _Drawn(figsize=(width / _DPI, height / _DPI), dpi=_DPI)
-        frames = _frames(figure, text, run, film)
+        figure = _Drawn(figsize=(width / film.dpi, height / film.dpi), dpi=film.dpi)
+        pictures = _pictures(figure, text, run, film)
         if path.suffix == ".gif":
+            frames = (Image.fromarray(picture[:, :, :3].copy()) for picture in pictures)
             first = next(frames).quantize(256, method=Image.Quantize.MAXCOVERAGE)
             # With one palette for all frames, colours do not flicker.
             rest = (frame.quantize(palette=first, dither=Image.Dither.NONE) for frame in frames)
             first.save(path, save_all=True, append_images=rest, duration=1000 // film.fps, loop=0)
             return
-        writer = FFMpegWriter(film.fps)
+        writer = FFMpegWriter(film.fps, extra_args=[*_ENCODING])
         try:
-            with writer.saving(figure, str(path), _DPI):
-                for _ in frames:
+            with writer.saving(figure, str(path), film.dpi):
+                for _ in pictures:
                     writer.grab_frame()
         except (OSError, CalledProcessError) as error:
             raise InputError(f"{path}: ffmpeg could not write it") from error
 
 
-def _frames(figure: Figure, text: str, run: Drawn, film: Film) -> Iterator[Image.Image]:
+def _pictures(figure: Figure, text: str, run: Drawn, film: Film) -> Iterator[np.ndarray]:
     """Draw and yield each frame of the figure; the background is drawn once."""
     canvas: Any = FigureCanvasAgg(figure)
     time = run.result.time
@@ -162,7 +184,7 @@ def _frames(figure: Figure, text: str, run: Drawn, film: Film) -> Iterator[Image
         for axes, cursor in zip(panels, cursors, strict=True):
             cursor.set_xdata([time[row]] * 2)
             axes.draw_artist(cursor)
-        yield Image.fromarray(np.asarray(canvas.buffer_rgba())[:, :, :3].copy())
+        yield np.asarray(canvas.buffer_rgba())
 
 
 def _draw_scene(axes: Any, run: Drawn) -> Callable[[int], list[Any]]:

@@ -20,6 +20,7 @@ from orchestrator.cosim import Table
 from orchestrator.figures.style import (
     COLOURS,
     FIGURE_FORMATS,
+    MARKS,
     REFERENCE,
     STYLES,
     Drawn,
@@ -27,7 +28,9 @@ from orchestrator.figures.style import (
     escape_math,
     printed_unit,
     runs_with,
+    text_scale,
     vehicle_colours,
+    widths_of_text,
 )
 from orchestrator.figures.visible import draw_signal, mean_window
 from orchestrator.machine.errors import InputError, did_you_mean
@@ -57,6 +60,14 @@ if TYPE_CHECKING:
     from matplotlib.gridspec import SubplotSpec
     from matplotlib.transforms import Transform
 
+#: Distance of the numbers of z from their axis, of the names of x and y from theirs, and what a
+#: letter of their numbers adds to it, with texts of 10 pt; of the name of z from its axis [pt].
+_Z_PAD, _BELOW, _LETTER, _ABOVE = 6, 16, 2, 4
+
+#: Room for numbers and names around the box of a path, and for the legend above; least size of the
+#: box; least size of a cell whose axes have more than a few numbers. With texts of 10 pt [in].
+_AROUND_BOX, _LEGEND, _LEAST_BOX, _LARGE_CELL = (1.1, 0.6), 0.4, 0.5, 3.0
+
 #: Least length of an axis of a path, as a share of the longest: a straight line gets a box.
 _FLATTEST = 0.3
 
@@ -69,9 +80,10 @@ _BEYOND = 1.5
 #: Lower end of a logarithmic axis of errors [m]: below it there are only zero crossings.
 _SMALLEST_ERROR = 1e-5
 
-#: Widths of the line of the first run and of the runs that it is compared with. The latter are
-#: solid, because a dashed line of an oscillating signal is a smear.
+#: Widths of the line of the first run and of the runs that it is compared with. The first of these
+#: is solid, because a dashed line of an oscillating signal is a smear; the others have long dashes.
 _THICK, _THIN = 1.4, 0.8
+_LONG_DASHES: tuple[Any, ...] = ("-", (0, (8, 2)), (0, (8, 2, 2, 2)), (0, (8, 2, 2, 2, 2, 2)))
 
 #: Peaks from here on are printed with an exponent [N, N.m].
 _MANY = 1e6
@@ -82,8 +94,9 @@ _MOST_MARKS, _MOST_TIMES = 20, 4
 #: Numbers of events closer together than this share of the time axis are stacked, this far [pt].
 _CLOSE, _RISE = 0.04, 13
 
-#: Characters in a line of the list of events, and height of a line [in].
-_LETTERS, _LINE = 104, 0.16
+#: Characters in a line of the list of events, per size of text of its width, and height of a line
+#: with texts of 10 pt [in].
+_LETTERS, _LINE = 2.0, 0.16
 
 #: Times at which lines join the vehicles of a fleet.
 _INSTANTS = 9
@@ -97,6 +110,12 @@ _RUN_STYLES: tuple[dict[str, Any], ...] = (
     {"linewidth": 0.8, "linestyle": "--"},
 )
 
+#: Characters of a label that has room in the legend of a panel.
+_SHORT = 16
+
+#: Size of the marks of a few vehicles [pt], and how many a line has.
+_MARK, _MARKS_ON_A_LINE = 3.5, 8
+
 
 class Cell(NamedTuple):
     """The part of a figure that a panel fills with axes."""
@@ -105,8 +124,8 @@ class Cell(NamedTuple):
     place: SubplotSpec
 
     def axes(self, **options: Any) -> Any:
-        """Return axes that fill the cell."""
-        return self.figure.add_subplot(self.place, **options)
+        """Return axes that fill the cell, with their names and legend in it."""
+        return self.figure.add_subplot(self.place.subgridspec(1, 1)[0], **options)
 
     def stack(self, n: int) -> list[Any]:
         """Return n axes above each other that share the axis of time."""
@@ -152,8 +171,10 @@ def title(axes: Axes, text: str) -> None:
     if n < 2:
         axes.set_title(text)
         return
+    # A wider legend would move the square of a path.
+    abreast = 2 if axes.name == "3d" else 3
     axes.legend(
-        title=text, alignment="left", ncols=n if n < 4 else -(-n // 2), loc="lower left",
+        title=text, alignment="left", ncols=n if n <= abreast else -(-n // 2), loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
     )  # fmt: skip
 
@@ -172,19 +193,29 @@ def over_time(panels: Sequence[Axes], runs: Sequence[Drawn], has_means: bool = F
 
 def run_line(i: int, colour: str) -> dict[str, Any]:
     """Return the style of the line of run i: the first is thick, the others are thin."""
-    return {"color": colour, "linewidth": _THIN if i else _THICK}
+    if not i:
+        return {"color": colour, "linewidth": _THICK}
+    dashes = _LONG_DASHES[(i - 1) % len(_LONG_DASHES)]
+    return {"color": colour, "linewidth": _THIN, "linestyle": dashes}
 
 
 def _draw_lines(
-    axes: Axes, time: np.ndarray, values: np.ndarray, labels: Sequence[str], run: int = 0
+    axes: Axes,
+    runs: Sequence[Drawn],
+    lines: Callable[[Drawn], tuple[np.ndarray, np.ndarray]],
+    labels: Sequence[str],
 ) -> None:
-    """Draw each column of values (rows, lines); runs from 1 on are thin and black."""
-    for i, (column, label) in enumerate(zip(values.T, labels, strict=True)):
-        if run == 0:
-            axes.plot(time, column, color=COLOURS[i], linestyle=STYLES[i], label=label)
-        else:
-            legend = "other run" if (run, i) == (1, 0) else None
-            axes.plot(time, column, color="black", linewidth=0.7, label=legend)
+    """Draw each column of the values (rows, lines) of runs; from the second on, thin and black."""
+    for i, run in enumerate(runs):
+        time, values = lines(run)
+        for j, (column, label) in enumerate(zip(values.T, labels, strict=True)):
+            if i == 0:
+                axes.plot(time, column, color=COLOURS[j], linestyle=STYLES[j], label=label)
+            else:
+                fits = len(runs) == 2 and len(run.label) <= _SHORT
+                other = escape_math(run.label) if fits else "other runs"
+                legend = other if (i, j) == (1, 0) else None
+                axes.plot(time, column, color="black", linewidth=0.7, label=legend)
 
 
 def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
@@ -194,27 +225,67 @@ def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     extent = np.maximum(upper - lower, _FLATTEST * max(float((upper - lower).max()), 1e-3))
     middle = (lower + upper) / 2
     low, high = (middle - 0.54 * extent).tolist(), (middle + 0.54 * extent).tolist()
-    x, y, z = earth_axes(z_up)
-    axes.set(
-        xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]),
-        xlabel=x, ylabel=y, zlabel=z,
-    )  # fmt: skip
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
     if not z_up:
         axes.invert_yaxis()
         axes.invert_zaxis()
-    box = np.maximum(extent, 0.5 * extent.max())
-    flat = float(box.max() / box[2]) - 1.0
-    # A tall box would overlap the panel below, a flat one the panel beside it.
-    zoom = min(0.95 - 0.2 * flat, 0.68 * float(np.linalg.norm(box) / box[2]))
-    axes.set_box_aspect(box, zoom=zoom)
+    cell = _cell_size(axes)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
-        axis.get_major_locator().set_params(nbins=4, steps=None)
+        n = 4 if cell.min() > _LARGE_CELL else 3
+        axis.get_major_locator().set_params(nbins=n, steps=None)
     axes.tick_params(labelsize="small", pad=0)
     # Any closer, a tick and a minus sign look like one dash.
-    axes.zaxis.set_tick_params(pad=6)
-    # Labels of a flat box would overlap the numbers below it, and be far from those beside it.
-    axes.xaxis.labelpad = axes.yaxis.labelpad = 8 * flat
-    axes.zaxis.labelpad = 14 - 4 * flat
+    axes.zaxis.set_tick_params(pad=_Z_PAD)
+    for artist in (*axes.lines, *axes.collections):
+        # A flat box is wider than its square of axes.
+        artist.set(clip_on=False, in_layout=False)
+    box = np.maximum(extent, 0.5 * extent.max())
+    axes.set_box_aspect(box)
+    axes.set_box_aspect(box, zoom=_zoom(axes, cell))
+    _label_box(axes, earth_axes(z_up))
+
+
+def _corners(axes: Any) -> np.ndarray:
+    """Return the corners of a box on the page (2, 2, 2, 2), by the ends of x, y and z."""
+    # Figures of a run need no 3D otherwise.
+    from mpl_toolkits.mplot3d.proj3d import proj_transform  # noqa: PLC0415
+
+    ends = np.meshgrid(axes.get_xlim(), axes.get_ylim(), axes.get_zlim(), indexing="ij")
+    x, y, _ = proj_transform(*map(np.ravel, ends), axes.get_proj())
+    return np.column_stack((x, y)).reshape(2, 2, 2, 2)
+
+
+def _cell_size(axes: Any) -> np.ndarray:
+    """Return the width and height of the cell of a path [in], as if texts had 10 pt."""
+    place = axes.get_subplotspec().get_topmost_subplotspec()
+    grid = place.get_gridspec()
+    parts = ((grid.get_width_ratios(), place.colspan), (grid.get_height_ratios(), place.rowspan))
+    share = [sum(ratios[i] for i in span) / sum(ratios) for ratios, span in parts]
+    size: np.ndarray = share * axes.get_figure().get_size_inches() / text_scale()
+    return size - (0.0, _LEGEND)
+
+
+def _zoom(axes: Any, cell: np.ndarray) -> float:
+    """Return the zoom with which a box of zoom 1, its numbers and names fill their cell."""
+    to_axes = axes.transData + axes.transAxes.inverted()
+    half = np.abs(to_axes.transform(_corners(axes).reshape(-1, 2)) - 0.5).max(axis=0)
+    room = np.maximum(cell - _AROUND_BOX, _LEAST_BOX)
+    return float((room / (2.0 * half * cell.min())).min())
+
+
+def _label_box(axes: Any, names: tuple[str, str, str]) -> None:
+    """Write the names of the axes beside the edges that have numbers: x and y below, z above."""
+    corners, offset = _corners(axes), {"textcoords": "offset points", "annotation_clip": False}
+    for k, (axis, side, ha) in enumerate(((axes.xaxis, -1, "right"), (axes.yaxis, 1, "left"))):
+        middles = corners.mean(axis=k).reshape(4, 2)
+        lowest = middles[middles[:, 1].argmin()]
+        numbers = axis.get_major_formatter().format_ticks(axis.get_majorticklocs())
+        away = text_scale() * (_BELOW + _LETTER * max(map(len, numbers)))
+        axes.annotate(names[k], lowest, xytext=(side * away, -away), ha=ha, va="top", **offset)
+    edges = corners.reshape(4, 2, 2)
+    right = edges[edges[..., 0].mean(axis=1).argmax()]
+    top = right[right[:, 1].argmax()]
+    axes.annotate(names[2], top, xytext=(0, _ABOVE), ha="center", va="bottom", **offset)
 
 
 def _axes_from_above(cell: Cell, z_up: bool) -> Any:
@@ -267,9 +338,10 @@ def list_events(figure: Figure, runs: Sequence[Drawn], grow: bool = True) -> Non
     lines = [f"{i}: {_event_text(label, runs)}" for i, label in enumerate(_events(runs), 1)]
     if not lines:
         return
-    text = textwrap.fill("; ".join(lines), _LETTERS)
+    text = textwrap.fill("; ".join(lines), int(_LETTERS * widths_of_text(figure)))
     if grow:
-        figure.set_figheight(figure.get_figheight() + _LINE * (2 + text.count("\n")))
+        rows = 2 + text.count("\n")
+        figure.set_figheight(figure.get_figheight() + _LINE * rows * text_scale())
     figure.supxlabel(escape_math(text), x=0.01, ha="left", fontsize="small")
 
 
@@ -350,9 +422,12 @@ def _path_from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
 def _all_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
     """The three tracking errors in one panel."""
     axes = cell.axes(ylabel="error [m]")
-    for i, (run, _) in enumerate(runs_with(runs, Loop.for_tracking)):
-        errors = tracking_error(run.result, run.loop)
-        _draw_lines(axes, run.result.time, errors, [f"$e_{k}$" for k in AXES], i)
+    _draw_lines(
+        axes,
+        [run for run, _ in runs_with(runs, Loop.for_tracking)],
+        lambda run: (run.result.time, tracking_error(run.result, run.loop)),
+        [f"$e_{k}$" for k in AXES],
+    )
     title(axes, "tracking errors")
     over_time([axes], runs)
 
@@ -368,7 +443,7 @@ def _errors(cell: Cell, runs: Sequence[Drawn], logarithmic: bool = False) -> Non
         axes.set_ylabel(f"$|e_{k}|$ [m]" if logarithmic else f"$e_{k}$ [m]")
         if logarithmic:
             axes.set_yscale("log")
-            axes.yaxis.get_major_locator().set_params(numticks=5)
+            axes.yaxis.get_major_locator().set_params(numticks=4)
             if axes.get_ylim()[1] > _SMALLEST_ERROR:
                 axes.set_ylim(bottom=max(_SMALLEST_ERROR, axes.get_ylim()[0]))
     title(panels[0], "tracking errors" + ", logarithmic" * logarithmic)
@@ -450,9 +525,12 @@ def _write(
 def _estimates(cell: Cell, runs: Sequence[Drawn]) -> None:
     axes = cell.axes(ylabel="estimate")
     labels = [rf"$\hat{{\theta}}_{i}$ [{unit}]" for i, unit in THETA.items()]
-    for i, (run, _) in enumerate(runs_with(runs, Loop.for_parameter_estimates)):
-        estimates = run.result.step_values(*run.loop.theta_hat)
-        _draw_lines(axes, run.result.step_start, estimates, labels, i)
+    _draw_lines(
+        axes,
+        [run for run, _ in runs_with(runs, Loop.for_parameter_estimates)],
+        lambda run: (run.result.step_start, run.result.step_values(*run.loop.theta_hat)),
+        labels,
+    )
     title(axes, "estimated parameters")
     over_time([axes], runs)
 
@@ -497,7 +575,8 @@ def _motion(name: str, directions: slice, is_rate: bool = False) -> Panel:
         if is_rate:
             time, values = time[:-1], np.diff(values, axis=0) / np.diff(time)[:, np.newaxis]
         symbol = r"$\dot{{{}}}$" if is_rate else "${}$"
-        _draw_lines(axes, time, values, [symbol.format(column[-1]) for column in columns])
+        labels = [symbol.format(column[-1]) for column in columns]
+        _draw_lines(axes, [run], lambda _: (time, values), labels)
         title(axes, name)
         over_time([axes], runs)
 
@@ -518,19 +597,36 @@ def _vehicle_label(run: Drawn, loop: Loop) -> str | None:
     return loop.name if len(run.loops) <= _MOST_NAMED else None
 
 
+def _marks(run: Drawn, loop: Loop) -> dict[str, Any]:
+    """Return the marks on the line of a vehicle, which do not cover another's; none of many."""
+    n, i = len(run.loops), run.loops.index(loop)
+    if n > _MOST_NAMED:
+        return {}
+    apart = max(1, len(run.result) // _MARKS_ON_A_LINE)
+    return {
+        "marker": MARKS[i],
+        "markersize": _MARK,
+        "markevery": (apart * (i + 1) // (n + 1), apart),
+    }
+
+
 def _fleet_paths(cell: Cell, runs: Sequence[Drawn]) -> None:
     """Paths of the control points of the first run, and their references."""
     run, axes = runs[0], cell.axes(projection="3d")
     paths = []
     for loop, _ in _vehicles(run, Loop.for_reference):
         paths.append(run.result.group(*loop.y_d))
-        axes.plot(*paths[-1].T, color=REFERENCE, linestyle="--", linewidth=0.8)
+        axes.plot(*paths[-1].T, color=REFERENCE, linestyle=":", linewidth=0.8)
     for loop, colour in _vehicles(run, Loop.for_control_point):
         paths.append(true_control_point(run.result, loop))
-        axes.plot(*paths[-1].T, color=colour, linewidth=1.3, label=_vehicle_label(run, loop))
-        axes.scatter(*paths[-1][0], color=colour, s=20)
+        axes.plot(
+            *paths[-1].T, color=colour, linewidth=1.3, label=_vehicle_label(run, loop),
+            **_marks(run, loop),
+        )  # fmt: skip
+        mark = _marks(run, loop).get("marker", MARKS[0])
+        axes.scatter(*paths[-1][0], color=colour, marker=mark, s=40)
     frame_path(axes, np.vstack(paths), run.z_up)
-    title(axes, "paths, and references (dashed)")
+    title(axes, f"paths{_whose(runs)}, references dotted")
 
 
 def _fleet_from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
@@ -542,13 +638,16 @@ def _fleet_from_above(cell: Cell, runs: Sequence[Drawn]) -> None:
         axes.plot(path[:, 1], path[:, 0], color=colour, linewidth=0.8)
     time = run.result.time
     instants = np.linspace(time[0], time[-1], _INSTANTS)
-    for row in np.searchsorted(time, instants).clip(0, len(time) - 1).tolist():
-        points = np.array([path[row] for path in paths])
-        spokes = np.array([(points[0], point) for point in points[1:]]).reshape(-1, 2, 3)
-        axes.plot(*spokes[:, :, 1::-1].T, color="black", linewidth=0.8, zorder=3)
-        axes.scatter(points[:, 1], points[:, 0], color=[c for _, c in shown], s=14, zorder=4)
+    rows = np.searchsorted(time, instants).clip(0, len(time) - 1)
+    points = np.array([path[rows, 1::-1] for path in paths])
+    for place in points[1:]:
+        spokes = np.stack((points[0], place)).transpose(2, 0, 1)
+        axes.plot(*spokes, color="black", linewidth=0.8, zorder=3)
+    for place, (loop, colour) in zip(points, shown, strict=True):
+        mark = _marks(run, loop).get("marker", MARKS[0])
+        axes.scatter(*place.T, color=colour, marker=mark, s=14, zorder=4)
     between = (time[-1] - time[0]) / (_INSTANTS - 1)
-    title(axes, f"from above, joined every {between:.3g} s")
+    title(axes, f"from above{_whose(runs)}, joined every {between:.3g} s")
 
 
 def _fleet_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
@@ -558,9 +657,12 @@ def _fleet_errors(cell: Cell, runs: Sequence[Drawn]) -> None:
         for loop, colour in _vehicles(run, Loop.for_tracking):
             error = size(tracking_error(run.result, loop))
             label = _vehicle_label(run, loop) if run is runs[0] else None
-            axes.plot(run.result.time, error, color=colour, label=label, **style)
+            axes.plot(
+                run.result.time, error, color=colour, label=label, **style, **_marks(run, loop)
+            )
     axes.set_ylim(bottom=0.0)
-    title(axes, _compared("size of the tracking errors", runs))
+    compared = f", {escape_math(runs[1].label)} dashed" if len(runs) > 1 else ""
+    title(axes, f"size of the tracking errors{compared}")
     over_time([axes], runs)
 
 
@@ -575,13 +677,15 @@ def _distances(cell: Cell, runs: Sequence[Drawn]) -> None:
         loops = [loop for loop, _ in _vehicles(run, _needs_distances)]
         if len(loops) <= _MOST_NAMED and run is runs[0]:
             apart = distances(run.result, loops)
-            for (names, values), colour in zip(apart.items(), COLOURS, strict=False):
-                axes.plot(run.result.time, values, color=colour, label=" to ".join(names), **style)
+            for i, (names, values) in enumerate(apart.items()):
+                look = {"color": COLOURS[i % len(COLOURS)], "linestyle": STYLES[i % len(STYLES)]}
+                axes.plot(run.result.time, values, label=" to ".join(names), **look)
         else:
             smallest = smallest_distances(run.result, loops)
-            axes.plot(run.result.time, smallest, color="black", label="smallest", **style)
+            label = f"smallest, {escape_math(run.label)}" if len(runs) > 1 else "smallest"
+            axes.plot(run.result.time, smallest, label=label, **style, color="black")
     axes.set_ylim(bottom=0.0)
-    title(axes, _compared("distances between vehicles", runs))
+    title(axes, "distances between vehicles")
     over_time([axes], runs)
 
 
@@ -594,13 +698,14 @@ def _smallest_distance(cell: Cell, runs: Sequence[Drawn]) -> None:
     over_time([axes], runs)
 
 
-def _compared(text: str, runs: Sequence[Drawn]) -> str:
-    return f"{text}, {runs[1].label} dashed" if len(runs) > 1 else text
+def _whose(runs: Sequence[Drawn]) -> str:
+    """Return the name of the only run that is shown, if there are others."""
+    return f" ({escape_math(runs[0].label)})" if len(runs) > 1 else ""
 
 
-PATH = Panel("path", Loop.for_control_point, _path, 3.4)
+PATH = Panel("path", Loop.for_control_point, _path, 4.0)
 FROM_ABOVE = Panel("path from above", Loop.for_control_point, _path_from_above)
-ALL_ERRORS = Panel("tracking errors", Loop.for_tracking, _all_errors, 3.4)
+ALL_ERRORS = Panel("tracking errors", Loop.for_tracking, _all_errors, 2.8)
 ERRORS = Panel("tracking errors", Loop.for_tracking, _errors, 4.0)
 LOGARITHMIC_ERRORS = Panel(
     "logarithmic tracking errors", Loop.for_tracking, partial(_errors, logarithmic=True), 4.0
@@ -608,7 +713,7 @@ LOGARITHMIC_ERRORS = Panel(
 COMMANDS = Panel(
     "commands", Loop.for_commands, lambda cell, runs: draw_commands(cell.stack(3), runs), 4.0
 )
-ESTIMATES = Panel("estimated parameters", Loop.for_parameter_estimates, _estimates, 3.6)
+ESTIMATES = Panel("estimated parameters", Loop.for_parameter_estimates, _estimates, 3.2)
 VELOCITY = Panel("estimated velocity", Loop.for_velocity_estimates, _velocity, 4.6, of_one=True)
 VELOCITY_ERRORS = Panel(
     "error of the estimated velocity", Loop.for_velocity_estimates,
@@ -678,6 +783,18 @@ def figures_of(key: str, loops: Sequence[Loop]) -> Iterator[tuple[str, str, Sequ
         yield FLEET, "", loops
     if len(loops) <= MOST_DRAWN and key != FLEET:
         yield from ((key, vehicle, [loop]) for loop, vehicle in suffixes(loops).items())
+
+
+def main_figure(key: str, loops: Sequence[Loop], vehicle: str = "") -> str:
+    """Return the figure that stands for a run: of several vehicles together, unless one is named.
+
+    Args:
+        key: of :data:`FIGURES`, for a single vehicle.
+        loops: of the vehicles.
+        vehicle: name of one; empty: all.
+
+    """
+    return FLEET if len(loops) > 1 and not vehicle else key
 
 
 def check_figure(key: str) -> None:

@@ -46,8 +46,9 @@ _GRID = 40
 #: without runs. Correlations: blue falls, red grows.
 _VALUES, _EMPTY, _CORRELATIONS = "cividis", "lightgrey", "RdBu_r"
 
-#: Influence: numbers are white on colours from here on; smaller numbers are not printed.
-_DARK, _NOTHING = 0.6, 0.05
+#: Influence: numbers are white on colours from here on; smaller numbers are not printed, on this
+#: colour; the matrix has about this share of the width.
+_DARK, _NOTHING, _FAINT, _MATRIX = 0.6, 0.05, "#F7F7F7", 0.5
 
 #: Largest number of lines or panels.
 _MOST_PARTS = 12
@@ -55,6 +56,9 @@ _MOST_PARTS = 12
 #: Logarithmic axes: numbers at most, decades up to which there are ticks between them, and
 #: decades below which also 3 has a number (below one decade 2 and 5).
 _TICKS, _SMALL_TICKS, _FEW = 6, 12, 2.5
+
+#: Logarithmic axes between these have plain numbers, others powers of ten.
+_PLAIN = 1e-3, 1e4
 
 #: An axis is logarithmic if its values are positive and their quantile of this share is so many
 #: times the opposite one.
@@ -157,7 +161,7 @@ def _scale(axis: Any, is_wide: bool) -> None:
     axis.set_major_locator(LogLocator(subs=subs, numticks=_TICKS))
     axis.set_minor_locator(LogLocator(subs=range(2, 10), numticks=_SMALL_TICKS))
     axis.set_minor_formatter(NullFormatter())
-    if is_short:
+    if low >= _PLAIN[0] and high <= _PLAIN[1]:
         axis.set_major_formatter("{x:g}")
 
 
@@ -335,7 +339,7 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
     parts = list(runs.parts(entry.by))
     height = max(_LINE * len(entry.show), _BAR / len(parts)) + _AROUND
     figure, panels = _panels(title, len(parts), 1, height, sharex=True)
-    has_gaps = False
+    has_gaps = has_small = False
     for axes, (name, part) in zip(panels.flat, parts, strict=True):
         matrix = np.array([[_correlation(part[x], part[y]) for x in entry.x] for y in entry.show])
         image = axes.imshow(matrix, cmap=_CORRELATIONS, vmin=-1.0, vmax=1.0, aspect="auto")
@@ -347,16 +351,32 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
                     ha="center", va="center",
                 )  # fmt: skip
         axes.set_yticks(range(len(entry.show)), [runs.name(value) for value in entry.show])
-        axes.set_xticks(range(len(entry.x)), [runs.name(value) for value in entry.x], rotation=90)
+        axes.set_xticks(range(len(entry.x)), [runs.name(value) for value in entry.x])
         axes.grid(visible=False)
         axes.set_facecolor(_EMPTY)
         axes.set_title(name)
         has_gaps |= bool(np.isnan(matrix).any())
+        has_small |= bool((np.abs(matrix) < _NOTHING).any())
+    _turn_long_names(figure, panels.flat[-1])
     names = max(name.get_window_extent().height for name in axes.get_xticklabels()) / figure.dpi
     figure.set_figheight(figure.get_figheight() + max(0.0, names - _NAMES))
     figure.colorbar(image, ax=list(panels.flat), label="rank correlation")
-    _add_legend(figure, *[_sample(_EMPTY, "one of the two is constant")] * has_gaps)
+    _add_legend(
+        figure,
+        *[_sample(_FAINT, f"no number: below {_NOTHING:g} in size")] * has_small,
+        *[_sample(_EMPTY, "one of the two is constant")] * has_gaps,
+    )
     return figure
+
+
+def _turn_long_names(figure: Figure, axes: Axes) -> None:
+    """Turn the names of the columns of a matrix, if one of them is wider than its column."""
+    names = axes.get_xticklabels()
+    share = figure.bbox.width * _MATRIX / len(names)
+    if max(name.get_window_extent().width for name in names) > share:
+        axes.tick_params("x", labelrotation=45)
+        for name in axes.get_xticklabels():
+            name.set(ha="right", rotation_mode="anchor")
 
 
 def _correlation(x: np.ndarray, y: np.ndarray) -> float:

@@ -5,17 +5,25 @@ from __future__ import annotations
 import colorsys
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import cycle
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from orchestrator.cosim import Table
 from orchestrator.vehicle.signals import STANDARD, Loop, Needs
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 #: Okabe and Ito's colours, darkest first, which the colour-blind can distinguish. For print, every
 #: line also has its own style.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000")
 STYLES = ("-", "--", "-.", ":")
+
+#: Marks of up to four vehicles: their lines differ without colours too.
+MARKS = ("o", "s", "^", "D")
 REFERENCE = "#555555"
 
 #: Alternating lightnesses, and saturation, of vehicles beyond the colours above.
@@ -30,32 +38,11 @@ FIN = ((0.74, 0.05), (0.84, 0.22), (0.94, 0.22), (0.94, 0.03))
 #: Width of a figure [in]: two columns of a journal, and legible on a phone.
 FIGURE_WIDTH = 7.2
 
-SETTINGS: Any = {
-    "axes.formatter.limits": (-3, 4),
-    "axes.grid": True,
-    "axes.labelpad": 2.0,
-    "axes.spines.right": False,
-    "axes.spines.top": False,
-    "axes.titlelocation": "left",
-    "axes.titlesize": "medium",
-    "agg.path.chunksize": 20_000,
-    "figure.constrained_layout.use": True,
-    "figure.titlesize": "large",
-    "font.size": 10,
-    "grid.alpha": 0.3,
-    "legend.borderaxespad": 0.2,
-    "legend.borderpad": 0.2,
-    "legend.columnspacing": 1.0,
-    "legend.fontsize": "small",
-    "legend.frameon": False,
-    "legend.handlelength": 1.6,
-    "legend.handletextpad": 0.5,
-    "legend.title_fontsize": "medium",
-    "lines.linewidth": 1.4,
-    "savefig.dpi": 200,
-    # Equal runs give equal files.
-    "svg.hashsalt": "auv-fmu",
-}
+#: Size of texts [pt] for which the heights of panels are given.
+_TEXT = 10.0
+
+#: Points in an inch.
+_POINTS = 72.0
 
 #: Greek letters that may come before an underscore in a heading, and their names in LaTeX.
 _GREEK = {
@@ -70,6 +57,28 @@ _SYMBOL = re.compile(rf"(?<![\w\\.])({'|'.join(_GREEK)}|[A-Za-z])_([A-Za-z0-9]+)
 FIGURE_FORMATS = ("png", "svg")
 
 
+#: A style of matplotlib: a name, the path of a file, or settings.
+Style: TypeAlias = str | Path | Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Look:
+    """The appearance of a figure.
+
+    Attributes:
+        width: of the figure [in]; None: the style's, or 7.2.
+        font: family, such as `serif` or `Times New Roman`; empty: the style's.
+        size: of texts [pt]; None: the style's, or 10.
+        style: applied over the project's own.
+
+    """
+
+    width: float | None = None
+    font: str = ""
+    size: float | None = None
+    style: Style = ""
+
+
 class Drawn(NamedTuple):
     """A run in a figure.
 
@@ -78,6 +87,7 @@ class Drawn(NamedTuple):
         result: its rows.
         z_up: if true, its path is drawn with z up and y west (reading 16), else down and east.
         loops: of its vehicles; figures of one vehicle show the first.
+        name: of its scenario, for legends in which a run has no other label; empty: unknown.
 
     """
 
@@ -85,6 +95,7 @@ class Drawn(NamedTuple):
     result: Table
     z_up: bool = False
     loops: Sequence[Loop] = (STANDARD,)
+    name: str = ""
 
     @property
     def loop(self) -> Loop:
@@ -94,6 +105,19 @@ class Drawn(NamedTuple):
     def lacks(self, needs: Callable[[Loop], Needs]) -> list[str]:
         """Return the columns and parameters of the loop that are needed and missing."""
         return self.result.missing(*needs(self.loop))
+
+
+def text_scale() -> float:
+    """Return the size of texts as a multiple of the usual one."""
+    # A figure is being drawn: matplotlib is there.
+    from matplotlib import rcParams  # noqa: PLC0415
+
+    return float(rcParams["font.size"]) / _TEXT
+
+
+def widths_of_text(figure: Figure) -> float:
+    """Return the width of a figure as a multiple of the size of its texts."""
+    return figure.get_figwidth() * _POINTS / (_TEXT * text_scale())
 
 
 def vehicle_colours(n: int) -> list[str]:

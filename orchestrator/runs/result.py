@@ -33,7 +33,8 @@ from orchestrator.cosim import (
     Table,
     TableFile,
 )
-from orchestrator.figures.style import Drawn, printed_unit
+from orchestrator.figures.run_figures import main_figure
+from orchestrator.figures.style import Drawn, Look, Style, printed_unit
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.identity import PACKAGES, digest_of
@@ -252,36 +253,71 @@ class Result(Table):
         }
         return frame
 
-    def plot(self, *what: str | Result) -> Figure:
+    def plot(
+        self,
+        *what: str | Result,
+        title: str = "",
+        labels: Sequence[str] = (),
+        width: float | None = None,
+        font: str = "",
+        size: float | None = None,
+        style: Style = "",
+    ) -> Figure:
         """Plot columns over time, with one panel for each group such as `plant.y`.
 
         Args:
             what: names of groups or columns, or patterns such as `plant.eta.*`; without any:
-                errors, commands and estimates of all vehicles. Results among them are drawn over
-                this one.
+                errors, commands and estimates of all vehicles, or all of few columns. Results among
+                them are drawn over this one.
+            title: heading; empty for none.
+            labels: of this result and the others, in legends; empty: labels or scenarios.
+            width: of the figure [in]; None: 7.2.
+            font: family, such as `serif` or `Times New Roman`; empty: DejaVu Sans.
+            size: of texts [pt]; None: 10.
+            style: of matplotlib (name, path of a file, or settings), applied over the project's
+                `auv_fmu.figures`; the arguments before it have precedence.
 
         Raises:
-            ValueError: a pattern matches no column.
+            ValueError: a pattern matches no column, there is no such font or style, or the number
+                of labels is wrong.
 
         """
         from orchestrator.figures.drawing import plot, told_apart  # noqa: PLC0415
 
         results = [self, *(each for each in what if isinstance(each, Result))]
         patterns = [each for each in what if not isinstance(each, Result)]
-        return plot(told_apart([result._drawn() for result in results]), patterns)
+        runs = told_apart([result._drawn() for result in results], labels=labels)
+        return plot(runs, patterns, title, Look(width, font, size, style))
 
-    def figure(self, *others: Result, name: str | None = None, vehicle: str = "") -> Figure:
+    def figure(
+        self,
+        *others: Result,
+        name: str | None = None,
+        vehicle: str = "",
+        title: str | None = None,
+        labels: Sequence[str] = (),
+        width: float | None = None,
+        font: str = "",
+        size: float | None = None,
+        style: Style = "",
+    ) -> Figure:
         """Draw the figure of its scenario, or another, as `auv-fmu run` does.
 
         Args:
             others: results that are drawn with it, as in a comparison.
             name: name of the figure, such as `comparison` or `tracking-velocity`; None: the
-                scenario's.
-            vehicle: name of the vehicle, if there are several; empty: the first.
+                scenario's, or of several vehicles the one of all.
+            vehicle: name of the vehicle, if there are several; empty: all, or the first.
+            title: heading; None: the scenario's; empty for none.
+            labels: as for :meth:`plot`, as all below.
+            width: of the figure [in]; panels of a narrow one are below each other.
+            font: family.
+            size: of texts [pt].
+            style: of matplotlib.
 
         Raises:
-            ValueError: there is no such figure, the result lacks all of its signals, or one of the
-                others is not a result.
+            ValueError: there is no such figure, font or style, the result lacks all signals of the
+                figure, one of the others is not a result, or the number of labels is wrong.
 
         """
         from orchestrator.figures.drawing import one_figure, told_apart  # noqa: PLC0415
@@ -289,8 +325,14 @@ class Result(Table):
         for other in others:
             if not isinstance(other, Result):
                 raise InputError(f"{other!r}: not a result; name= takes the name of a figure")
-        runs = told_apart([result._drawn() for result in (self, *others)])
-        return one_figure(name or self._scenario.figure, self._scenario.title, runs, vehicle)
+        runs = told_apart([result._drawn() for result in (self, *others)], labels=labels)
+        return one_figure(
+            name or main_figure(self._scenario.figure, self._loops, vehicle),
+            self._scenario.title if title is None else title,
+            runs,
+            vehicle,
+            Look(width, font, size, style),
+        )
 
     def save(
         self,
@@ -337,7 +379,8 @@ class Result(Table):
         return folder
 
     def _drawn(self) -> Drawn:
-        return Drawn(self._scenario.legend, self, self._scenario.z_up, self._loops)
+        scenario = self._scenario
+        return Drawn(scenario.legend, self, scenario.z_up, self._loops, scenario.name)
 
 
 def check_function(name: str, function: object) -> None:
@@ -618,8 +661,9 @@ def read_result(
     for rows in blocks:
         table.take(rows)
     table.end(ending_in(record))
-    label = str(record.get("label") or record.get("scenario") or file.stem)
-    return Drawn(label, table, bool(record.get("z_up")), loops)
+    name = str(record.get("scenario") or file.stem)
+    label = str(record.get("label") or name)
+    return Drawn(label, table, bool(record.get("z_up")), loops, name)
 
 
 def _stored(path: Path) -> tuple[Path, dict[str, Any], Header, Iterator[np.ndarray]]:

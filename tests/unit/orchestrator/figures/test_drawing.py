@@ -121,6 +121,25 @@ def test_labels_do_not_depend_on_where_the_name_of_a_component_ends():
     assert [run.label for run in told_apart(runs)] == ["a.b.k = 1", "a.b.k = 2"]
 
 
+def test_runs_without_labels_have_the_names_of_their_scenarios():
+    runs = [Drawn("fig4", loop_table(), name="fig4"), Drawn("PD", loop_table(), name="fig5-pd")]
+    assert [run.label for run in told_apart(runs)] == ["fig4", "fig5-pd"]
+    both = [runs[0]._replace(label="proposed"), runs[1]]
+    assert [run.label for run in told_apart(both)] == ["proposed", "PD"]
+
+
+def test_given_labels_are_for_all_runs():
+    runs = [Drawn("fig4", loop_table()), Drawn("fig5", loop_table())]
+    assert [run.label for run in told_apart(runs, labels=["a", "b"])] == ["a", "b"]
+    for labels, text in (
+        ("ab", "texts in a list"),
+        (["a"], "1 labels for 2"),
+        (["a", "a"], "must differ"),
+    ):
+        with pytest.raises(InputError, match=text):
+            told_apart(runs, labels=labels)
+
+
 def test_unknown_columns_are_refused_with_a_hint():
     with pytest.raises(InputError, match=r"no column matches 'plant.ta'; did you mean plant.ta"):
         plot([Drawn("run", loop_table())], ["plant.ta"])

@@ -73,7 +73,7 @@ def test_film_of_several_has_one_picture_with_the_colours_of_all(tmp_path):
     assert len(frames) == 20
     assert all((a != b).any() for a, b in pairwise(frames))
     # Left of the panels and above the legend.
-    scene = frames[-1][40:380, :380]
+    scene = frames[-1][60:480, :480]
     for colour in vehicle_colours(3):
         rgb = [int(colour[k : k + 2], 16) for k in (1, 3, 5)]
         is_near = (np.abs(scene - rgb) < 12).all(axis=2)

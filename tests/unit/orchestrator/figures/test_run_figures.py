@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import logging
+import subprocess
 import warnings
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
+from shutil import which
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 
 from orchestrator.cosim import Ending, Occurrence, PortName, Table
-from orchestrator.figures.drawing import compose, draw, one_figure, save
-from orchestrator.figures.run_figures import FIGURES, check_figure
-from orchestrator.figures.style import Drawn
+from orchestrator.figures.drawing import compose, draw, one_figure, plot, save
+from orchestrator.figures.run_figures import FIGURES, FLEET, check_figure
+from orchestrator.figures.style import COLOURS, Drawn, Look
 from orchestrator.machine.errors import InputError
 from orchestrator.vehicle.signals import STANDARD
 from support.machine import contents
-from support.tables import at_its_time, loop_table
+from support.tables import at_its_time, fleet, fleet_table, loop_table
 from support.tiers import slow
 
 
@@ -70,8 +76,11 @@ def test_lines_do_not_depend_on_the_order_of_evaluation(figure):
 def test_axes_of_a_path_say_which_way_they_point(z_up):
     figure, _ = compose("", FIGURES["tracking"][""], [Drawn("run", loop_table(), z_up)])
     [axes] = [axes for axes in figure.axes if axes.name == "3d"]
-    assert axes.get_zlabel() == ("z up [m]" if z_up else "z down [m]")
-    assert axes.get_ylabel() == ("y west [m]" if z_up else "y east [m]")
+    names = {text.get_text() for text in axes.texts}
+    assert names == {
+        "x north [m]",
+        *(("y west [m]", "z up [m]") if z_up else ("y east [m]", "z down [m]")),
+    }
     # Right-handed: both are turned around, or neither.
     assert axes.zaxis_inverted() == axes.yaxis_inverted() == (not z_up)
 
@@ -155,13 +164,14 @@ def test_long_names_leave_the_panels_their_room(kind, n):
     box = legend.get_window_extent()
     assert page.x0 <= box.x0 and box.x1 <= page.x1 and box.y1 <= page.y1
     for axes in figure.axes:
-        assert axes.get_position().width > 0.3
+        assert axes.get_position().width > 0.28
         legends = filter(None, [axes.get_legend()])
         titles = (axes.title, *(legend.get_title() for legend in legends))
         for part in (axes, *axes.texts, *titles):
             assert not box.overlaps(part.get_window_extent())
         for text in axes.texts:
-            assert axes.bbox.x0 <= text.get_window_extent().x0
+            left = page if axes.name == "3d" else axes.bbox
+            assert left.x0 <= text.get_window_extent().x0
 
 
 def test_a_figure_of_one_run_names_no_others():
@@ -238,6 +248,119 @@ def test_waypoints_are_in_the_path():
     [axes] = [axes for axes in figure.axes if axes.name == "3d"]
     [marks] = [marks for marks in axes.collections if marks.get_label() == "waypoints"]
     np.testing.assert_array_equal(np.column_stack(marks._offsets3d), points)
+
+
+# Figures for a paper
+
+
+@pytest.mark.parametrize("width", [3.5, 7.0])
+def test_texts_are_apart_and_on_the_page(width, tmp_path, monkeypatch):
+    """In one column and in two; only texts that are drawn count."""
+    one, three = loop_table(seed=3), fleet_table(3)
+    one["plant.tau.u"][200] = -366.0
+    events = Ending(events=(Occurrence(2.0, "a", "fault", 0), Occurrence(2.1, "b", "gust", 1)))
+    runs = [
+        Drawn("proposed", Table.of(one.header, one.rows, events)),
+        Drawn("PD", loop_table(seed=4)),
+        Drawn("MPC", loop_table(seed=5)),
+    ]
+    vehicles = [Drawn(run.label, three, loops=fleet(3)) for run in runs[:2]]
+    look, title = Look(width=width, size=8.0), "A heading that is longer than a column is wide"
+    figures = [
+        one_figure("tracking", title, runs[:1], look=look),
+        one_figure("comparison", title, [run._replace(z_up=True) for run in runs[:2]], look=look),
+        one_figure(FLEET, title, vehicles, look=look),
+        plot(runs, ["plant.eta", "plant.tau", "controller.theta_hat"], title, look),
+    ]
+    drawn: set[Text] = set()
+    original = Text.draw
+    monkeypatch.setattr(
+        Text, "draw", lambda text, *rest, **more: (drawn.add(text), original(text, *rest, **more))
+    )
+    for figure in figures:
+        assert figure.get_figwidth() == width
+        canvas = FigureCanvasAgg(figure)
+        save(figure)
+        drawn.clear()
+        canvas.draw()
+        boxes = [
+            (text.get_text(), text.get_window_extent())
+            for text in drawn
+            if text.get_text() and text.get_visible()
+        ]
+        page = figure.bbox.padded(1)
+        off_page = [name for name, box in boxes if page.count_contains(box.corners()) < 4]
+        # Boxes are a pixel larger than what is drawn.
+        touching = [
+            (a, b)
+            for (a, box), (b, other) in combinations(boxes, 2)
+            if box.padded(-1).overlaps(other.padded(-1))
+        ]
+        assert (off_page, touching) == ([], [])
+
+
+@pytest.mark.parametrize("width", [3.5, 7.0])
+def test_fonts_of_a_pdf_are_truetype_and_texts_of_an_svg_are_texts(width, tmp_path):
+    """Journals refuse fonts of type 3."""
+    for font in ("", "serif"):
+        figure = one_figure(
+            "tracking", "", [Drawn("run", loop_table())], look=Look(width, font, 8.0)
+        )
+        figure.savefig(tmp_path / "a.pdf")
+        figure.savefig(tmp_path / "a.svg")
+        fonts = (tmp_path / "a.pdf").read_bytes()
+        assert b"/CIDFontType2" in fonts and b"/Type3" not in fonts
+        assert "tracking errors</text>" in (tmp_path / "a.svg").read_text(encoding="utf-8")
+        if pdffonts := which("pdffonts"):
+            listed = subprocess.run(
+                [pdffonts, tmp_path / "a.pdf"], capture_output=True, text=True, check=True
+            ).stdout.splitlines()[2:]
+            assert listed and all(
+                " CID TrueType " in line and " yes yes " in line for line in listed
+            )
+
+
+def test_a_look_is_applied_over_the_projects_style(tmp_path):
+    """Width, font and size have precedence over the style."""
+    file = tmp_path / "mine.mplstyle"
+    file.write_text("figure.figsize: 5, 4\nfont.size: 9\nlines.linewidth: 3", encoding="utf-8")
+    run = [Drawn("run", loop_table())]
+    figure = plot(run, ["plant.eta.x"], look=Look(style=file))
+    [axes] = figure.axes
+    assert (figure.get_figwidth(), axes.yaxis.label.get_fontsize()) == (5.0, 9.0)
+    assert axes.get_lines()[0].get_linewidth() == 3.0
+    again = plot(run, ["plant.eta.x"], look=Look(3.5, "serif", 8.0, {"figure.figsize": (5, 4)}))
+    [label] = [axes.yaxis.label for axes in again.axes]
+    assert (again.get_figwidth(), label.get_fontsize(), label.get_family()) == (3.5, 8.0, ["serif"])
+
+
+@pytest.mark.parametrize(
+    ("look", "text"),
+    [
+        (Look(width=0.1), "width 0.1: must be from 2 to 40 in"),
+        (Look(size=float("nan")), "size nan: must be from 4 to 40 pt"),
+        (Look(font="DejaVu Sanz"), "font 'DejaVu Sanz' is not installed; did you mean DejaVu Sans"),
+        (Look(style="none.mplstyle"), "style none.mplstyle: no such file"),
+        (Look(style={"figure.figsze": 3}), "style: .*'figure.figsze' is not a valid"),
+    ],
+)
+def test_a_look_that_there_is_not_is_refused(look, text):
+    with pytest.raises(InputError, match=text):
+        plot([Drawn("run", loop_table())], ["plant.eta.x"], look=look)
+
+
+def test_a_mistake_in_the_file_of_a_style_is_refused(tmp_path):
+    file = tmp_path / "mine.mplstyle"
+    file.write_text("lines.linewidth: 3\nfigure.figsze: 5, 4\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"style: Bad key figure.figsze in file .*, line 2"):
+        plot([Drawn("run", loop_table())], ["plant.eta.x"], look=Look(style=file))
+
+
+def test_users_may_take_the_style():
+    """It has the colours of the figures."""
+    with plt.style.context("auv_fmu.figures"):
+        assert plt.rcParams["pdf.fonttype"] == plt.rcParams["ps.fonttype"] == 42
+        assert plt.rcParams["axes.prop_cycle"].by_key()["color"] == list(COLOURS)
 
 
 # Events
