@@ -165,9 +165,9 @@ def test_bounds_are_infinite_where_the_proof_does_not_reach():
 def test_page_has_the_gains_and_the_bounds():
     """The tables on the filter and on the estimate in formation.md."""
     page = (Path(__file__).parents[2] / "docs/explanation/formation.md").read_text("utf-8")
-    assert f"(1 + 10 exp(-3)) r = {RATE_GAIN:.3f} r" in page
-    assert f"| {ACCELERATION_GAIN:.3f} omega r |" in page
-    assert f"| {LAG_GAIN:.3f} r / omega |" in page
+    assert rf"(1 + 10 e^{{-3}})\, r = {RATE_GAIN:.3f}\, r`" in page
+    assert rf"| $`{ACCELERATION_GAIN:.3f}\, \omega r`$ |" in page
+    assert rf"| $`{LAG_GAIN:.3f}\, r / \omega`$ |" in page
     rows = re.findall(
         r"^\| (\d) s \| (none|one) \| ([\d.]+) m/s² \| (.*) m \| (.*) m/s \|$", page, re.M
     )

@@ -30,7 +30,7 @@ from orchestrator.runs.own_components import new_controller
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.scenario import names
 from orchestrator.vehicle import reduction
-from orchestrator.vehicle.indices import metrics_of
+from orchestrator.vehicle.indices import metrics, metrics_of
 from support.browser import BROWSER, Browser, browser
 from support.events import ALL, ENDS
 from support.live import TOLERANCE, needs_npm, needs_zig
@@ -165,11 +165,13 @@ def compare_indices(
     """
     rows = table.rows.copy()
     rows[:, places(table)] = computed
-    metrics = metrics_of(Table.of(table.header, rows), run.loops)
-    together = {name: [value] for name, value in metrics.together.items()}
+    found = metrics_of(Table.of(table.header, rows), run.loops)
+    together = {name: [value] for name, value in found.together.items()}
     assert len(together) == (len(run.loops) > 1)
+    shown = {index.name for index in metrics()}
     for loop, measured in zip(run.loops, outcome["metrics"], strict=True):
-        wanted = metrics.found(loop) | together
+        of_loop = found.found(loop)
+        wanted = {name: of_loop[name] for name in of_loop.keys() & shown} | together
         assert measured.keys() == wanted.keys()
         for index, values in wanted.items():
             tolerance = TOLERANCE if index in near else 0.0
