@@ -419,7 +419,9 @@ def command_line() -> dict[str, str]:
         for section in _sections(f"auv-fmu {name}", COMMANDS[name][1], command, common)
     )
     return {
-        "common": table(("argument", "meaning"), sorted(common, key=lambda row: row[0].lower())),
+        "common": table(
+            ("argument", "meaning"), sorted(common, key=lambda row: (row[0].lower(), row[1]))
+        ),
         "commands": "\n\n".join(sections),
     }
 

@@ -85,7 +85,7 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
         type=_kind,
         choices=(AUTO, *KINDS),
         default=PYTHON,
-        help=f"kind of FMU: {PYTHON} (source code) or {NATIVE} (its translation to C, compiled), "
+        help=f"kind of FMUs for other tools: {PYTHON} (source code) or {NATIVE} (its translation to C), "
         f"with the same numbers, or {AUTO} ({NATIVE} if there is a C compiler); default: {PYTHON}",
     )
 

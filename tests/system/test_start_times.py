@@ -254,7 +254,9 @@ def test_commands_take_the_system_and_the_result(folders, name, start, capsys, t
         table = f"{result}/result.csv"
         assert main(["verify", table, "--scenario", ssp]) == 0
         # Among the outputs are times.
-        shift = re.sub(r"t = \S+ to \S+ s|t = \S+,|^  \S+ .*", "", capsys.readouterr().out, 0, re.M)
+        shift = re.sub(
+            r"t = \S+ to \S+ s|t = \S+,|^  \S+ .*", "", capsys.readouterr().out, flags=re.M
+        )
         outputs.append(shift.replace(str(folder), ""))
         whole = Path(table).read_text()
         if name in ("vehicle", "linear"):
