@@ -85,8 +85,9 @@ def add_kind(parser: argparse.ArgumentParser) -> None:
         type=_kind,
         choices=(AUTO, *KINDS),
         default=PYTHON,
-        help=f"kind of FMUs for other tools: {PYTHON} (source code) or {NATIVE} (its translation to C), "
-        f"with the same numbers, or {AUTO} ({NATIVE} if there is a C compiler); default: {PYTHON}",
+        help=f"kind of FMUs for other tools: {PYTHON} (source code) or {NATIVE} (its translation "
+        f"to C), with the same numbers, or {AUTO} ({NATIVE} if there is a C compiler); default: "
+        f"{PYTHON}",
     )
 
 
