@@ -38,6 +38,9 @@ VERDICT = "verdict"
 #: Anchors in the report for links to its pages; other links become text.
 _ANCHORS = {"paper.md": "#what-is-wrong-in-the-paper", "readings.md": "#readings"}
 
+#: Code, and an option in it, which lines do not divide.
+_CODE, _OPTION = re.compile(r"<code>[^<]*</code>"), re.compile(r"--\w+")
+
 _LINK = re.compile(r"\[([^\]]+)\]\(([\w./-]+\.md)(?:#[\w-]+)?\)")
 _FILLED = re.compile(r"<!-- (?:filled: \w+|/) -->")
 _READING = re.compile(r"^#+ Reading (\d+)$", re.MULTILINE)
@@ -134,6 +137,7 @@ def html(text: str, folder: Path) -> str:
         typeset(_MARKDOWN.renderer.render(part, _MARKDOWN.options, {}))
         for part in (tokens[:first], tokens[first:])
     )
+    body = _CODE.sub(lambda code: _OPTION.sub(r"<span>\g<0></span>", code[0]), body)
     links = typeset(_MARKDOWN.render(contents(text)))
     return Template(_TEMPLATE.read_text(encoding="utf-8")).substitute(
         title=title.title, start=start, contents=links, body=body
