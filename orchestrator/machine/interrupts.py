@@ -91,7 +91,7 @@ class Interrupts:
         before = signal.set_wakeup_fd(end_of_signals, warn_on_full_buffer=False)
         leaving = threading.Lock()
         # A thread, because Python handles no signal while an FMU computes.
-        arguments = (end_of_thread, give_up, leaving)
+        arguments = (end_of_thread, os.fstat(end_of_thread), give_up, leaving)
         with suppress(RuntimeError):
             # If no thread can be started, a third signal does nothing.
             threading.Thread(target=self._count, args=arguments, daemon=True).start()
@@ -105,9 +105,14 @@ class Interrupts:
             if is_still(end_of_signals, status):
                 os.close(end_of_signals)
 
-    def _count(self, numbers: int, give_up: Callable[[], None], leaving: threading.Lock) -> None:
+    def _count(
+        self,
+        numbers: int,
+        status: os.stat_result,
+        give_up: Callable[[], None],
+        leaving: threading.Lock,
+    ) -> None:
         stops: list[float] = []
-        status = os.fstat(numbers)
         with suppress(OSError):
             while number := os.read(numbers, 1):
                 if number[0] in _STOPS:
