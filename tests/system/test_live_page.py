@@ -108,9 +108,10 @@ class Live:
         self.call("Emulation.setDeviceMetricsOverride", **size, mobile=width < 500)
 
     def prefer(self, scheme: str) -> None:
-        """Let the system ask for `light` or `dark`."""
-        feature = {"name": "prefers-color-scheme", "value": scheme}
-        self.call("Emulation.setEmulatedMedia", features=[feature])
+        """Let the system ask for `light` or `dark`, and for no motion, so that nothing plays."""
+        wishes = {"prefers-color-scheme": scheme, "prefers-reduced-motion": "reduce"}
+        features = [{"name": name, "value": value} for name, value in wishes.items()]
+        self.call("Emulation.setEmulatedMedia", features=features)
 
     def complaints(self) -> list[str]:
         """Errors of the page, and its requests to the network."""
@@ -133,10 +134,10 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
 @pytest.fixture
 def opened(page, chromium) -> Iterator[Live]:
     """A fresh page, without complaints at the end."""
-    chromium.open(page)
     live = Live(chromium)
-    live.resize(1280, 900)
     live.prefer("light")
+    chromium.open(page)
+    live.resize(1280, 900)
     yield live.start()
     assert live.complaints() == []
 
@@ -174,6 +175,7 @@ def test_arrow_keys_move_a_slider_and_the_numbers(opened):
     before = opened.run(CSV)
     opened.run(f"{slider}.valueAsNumber = 700; {slider}.dispatchEvent(new Event('input'))")
     opened.click("#download")
+    opened.wait("'saved' in globalThis")
     assert opened.run("saved.text()") == opened.run(CSV) != before
 
 
@@ -406,12 +408,12 @@ def test_all_vehicles_are_shown_and_one_is_chosen(opened):
     own = opened.run(COLOR)
     opened.set('{preset: "formation-v", stop_time: 30, "auv3.plant.eta0.z": 4}')
     legend = opened.text("legend").split()
-    assert legend == ["auv1", "auv2", "auv3", "proposed", "PD", "waypoints"]
+    assert legend == ["auv1", "auv2", "auv3", "proposed", "PD", "reference", "waypoints"]
     header, found = opened.rows()
     for vehicle, other in (("auv1", "auv2"), ("auv3", "auv1")):
         opened.run(f"{CHOSEN}.value = '{vehicle}'; {CHOSEN}.dispatchEvent(new Event('change'))")
         sliders = opened.run(SLIDERS)
-        assert f"{vehicle}.controller.eps_t" in sliders
+        assert any(slider.endswith(f": {vehicle}.controller.eps_t") for slider in sliders)
         assert not any(other in slider for slider in sliders)
         # Its indices, and the one of all vehicles.
         applied = found[:-1, header.index(f"{vehicle}.plant.tau_applied.u")]
