@@ -158,8 +158,8 @@ def _print_outputs(name: str, run: WrittenRun) -> None:
     show(name)
     _print_line("", ["first", "last"])
     for output in known[:_MOST_OUTPUTS]:
-        unit = rows.units.get(output, "")
-        title = output if unit in ("", "1") else f"{output} [{printed_unit(unit)}]"
+        unit = printed_unit(rows.units.get(output, ""))
+        title = f"{output} [{unit}]" if unit else output
         # The sum is zero instead of minus zero.
         _print_line(title, [format_number(float(rows[output][i]) + 0.0) for i in (0, -1)])
     more = len(known) - _MOST_OUTPUTS

@@ -153,9 +153,10 @@ def runs_with(runs: Sequence[Drawn], needs: Callable[[Loop], Needs]) -> Iterator
 
 
 def printed_unit(unit: str) -> str:
-    """Return a unit of FMI in print: N.m as N·m, m/s2 as m/s²."""
+    """Return a unit of FMI in print: N.m as N·m, m/s2 as m/s², nothing for 1."""
     text = unit.replace("s^1/2", "√s").replace(".", "·")
-    return re.sub(r"(?<=[A-Za-z])\d+", lambda power: power[0].translate(_RAISED), text)
+    raised = re.sub(r"(?<=[A-Za-z])\d+", lambda power: power[0].translate(_RAISED), text)
+    return "" if raised == "1" else raised
 
 
 def escape_math(text: str) -> str:

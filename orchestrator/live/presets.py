@@ -344,8 +344,8 @@ def _parameters(text: Text) -> Iterator[Plain]:
             "default": variable.shown(start),
             "value": variable.shown(value),
         }
-        if variable.unit and variable.unit != "1":
-            data["unit"] = printed_unit(variable.unit)
+        if unit := printed_unit(variable.unit or ""):
+            data["unit"] = unit
         for end in ("min", "max"):
             if (limit := getattr(variable, end)) is not None:
                 data[end] = float(limit)
