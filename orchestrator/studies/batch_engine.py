@@ -39,7 +39,7 @@ from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import (
     WATCHED,
     cautions,
-    cautions_seen,
+    cautions_of,
     values_of,
 )
 from orchestrator.vehicle.indices import INDICES, SMALLEST_DISTANCE, prefixed, smallest_of
@@ -248,7 +248,7 @@ class _Programs:
         every = cautions(value, point.step, self.loops)
         for loop, places in zip(self.loops, compiled.watched, strict=True):
             seen = {name: numbers[i] for name, i in places.items() if not isnan(numbers[i])}
-            every += cautions_seen(seen, loop, value)
+            every += cautions_of(seen, loop, value)
         return kinds_of(every)
 
     def value(self, point: Point, name: str) -> Value | None:

@@ -143,12 +143,12 @@ def cautions(value: ValueOf, step: float, loops: Sequence[Loop]) -> list[Caution
     found: list[Caution] = []
     for loop in {loop.controller: loop for loop in loops}.values():
         if (observer := observer_of(value, loop.controller)) is not None:
-            found += _warnings(observer_step.of_step(observer, step)._asdict(), loop, value)
+            found += cautions_of(observer_step.of_step(observer, step)._asdict(), loop, value)
     return found
 
 
-def _warnings(numbers: Mapping[str, float], loop: Loop, value: ValueOf) -> Iterator[Caution]:
-    """Yield the warnings of the rules whose numbers are given."""
+def cautions_of(numbers: Mapping[str, float], loop: Loop, value: ValueOf) -> Iterator[Caution]:
+    """Yield the warnings of the rules whose numbers are given, by the names of the results."""
 
     def written(field: re.Match[str]) -> str:
         name, digits = field.groups()
@@ -234,7 +234,7 @@ class Watch:
         return [
             caution
             for loop, reductions in self._reductions.items()
-            for caution in cautions_seen(
+            for caution in cautions_of(
                 {
                     name: value
                     for reduction in reductions.values()
@@ -244,11 +244,6 @@ class Watch:
                 partial(value_of, table),
             )
         ]
-
-
-def cautions_seen(seen: Mapping[str, float], loop: Loop, value: ValueOf) -> Iterator[Caution]:
-    """Yield the warnings that follow from the results of :data:`WATCHED` for a loop."""
-    return _warnings(seen, loop, value)
 
 
 def cautions_beside(
