@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import argparse
 from io import BytesIO
-from itertools import product
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 from mpl_toolkits.mplot3d.axes3d import Axes3D
-from mpl_toolkits.mplot3d.proj3d import proj_transform
 from PIL import Image, ImageOps
 
 from orchestrator.commands.main import main as auv_fmu
@@ -31,6 +28,7 @@ from orchestrator.figures.run_figures import (
     FLEET_FROM_ABOVE,
     PATH,
     Cell,
+    box_corners,
 )
 from orchestrator.figures.study_figures import draw_figures
 from orchestrator.figures.study_values import Values
@@ -130,10 +128,8 @@ def _fill(axes: Axes3D) -> None:
     place = axes.get_position(original=True)
     axes.apply_aspect()
     shown = axes.get_position()
-    corners = np.array([*product(axes.get_xlim(), axes.get_ylim(), axes.get_zlim())])
-    x, y, _ = proj_transform(*corners.T, axes.get_proj())
     to_figure = axes.transData - axes.figure.transFigure
-    points = to_figure.transform(np.column_stack([x, y]))
+    points = to_figure.transform(box_corners(axes).reshape(-1, 2))
     low, high = points.min(axis=0), points.max(axis=0)
     scale = min(place.size / (high - low))
     start = (place.min + place.max) / 2 + scale * (shown.min - (low + high) / 2)

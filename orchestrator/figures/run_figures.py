@@ -245,7 +245,7 @@ def frame_path(axes: Any, points: np.ndarray, z_up: bool) -> None:
     _label_box(axes, earth_axes(z_up))
 
 
-def _corners(axes: Any) -> np.ndarray:
+def box_corners(axes: Any) -> np.ndarray:
     """Return the corners of a box on the page (2, 2, 2, 2), by the ends of x, y and z."""
     # Figures of a run need no 3D otherwise.
     from mpl_toolkits.mplot3d.proj3d import proj_transform  # noqa: PLC0415
@@ -268,14 +268,14 @@ def _cell_size(axes: Any) -> np.ndarray:
 def _zoom(axes: Any, cell: np.ndarray) -> float:
     """Return the zoom with which a box of zoom 1, its numbers and names fill their cell."""
     to_axes = axes.transData + axes.transAxes.inverted()
-    half = np.abs(to_axes.transform(_corners(axes).reshape(-1, 2)) - 0.5).max(axis=0)
+    half = np.abs(to_axes.transform(box_corners(axes).reshape(-1, 2)) - 0.5).max(axis=0)
     room = np.maximum(cell - _AROUND_BOX, _LEAST_BOX)
     return float((room / (2.0 * half * cell.min())).min())
 
 
 def _label_box(axes: Any, names: tuple[str, str, str]) -> None:
     """Write the names of the axes beside the edges that have numbers: x and y below, z above."""
-    corners, offset = _corners(axes), {"textcoords": "offset points", "annotation_clip": False}
+    corners, offset = box_corners(axes), {"textcoords": "offset points", "annotation_clip": False}
     for k, (axis, side, ha) in enumerate(((axes.xaxis, -1, "right"), (axes.yaxis, 1, "left"))):
         middles = corners.mean(axis=k).reshape(4, 2)
         lowest = middles[middles[:, 1].argmin()]
