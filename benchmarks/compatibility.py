@@ -22,6 +22,7 @@ from fmpy.validation import validate_fmu
 
 from fmus.discovery import REFERENCE, components, source_of
 from fmus.kinds import NATIVE, PYTHON
+from orchestrator.machine.texts import BOOLEANS
 from orchestrator.runs.bundle import current_fmus
 
 #: The table that is written.
@@ -128,8 +129,7 @@ def _reference(fmu: Path) -> tuple[Path, dict[str, np.ndarray], np.ndarray]:
 def _columns(path: Path) -> dict[str, np.ndarray]:
     with path.open(encoding="utf-8", newline="") as file:
         header, *rows = csv.reader(file)
-    truth = {"true": "1", "false": "0"}
-    values = np.array([[float(truth.get(cell, cell)) for cell in row] for row in rows])
+    values = np.array([[float(BOOLEANS.get(cell, cell)) for cell in row] for row in rows])
     return dict(zip(header, values.T, strict=True))
 
 
