@@ -8,7 +8,6 @@
 
 #include <math.h>
 #include <stdint.h>
-#include <string.h>
 
 enum { GENERATOR_WORDS = 624, SHIFT = 397, PAIR = 4 /* words of two normal numbers */ };
 
@@ -37,15 +36,6 @@ static void seed_generator(generator *it, uint32_t seed) {
     it->place = GENERATOR_WORDS;
     it->has_next = 0;
     it->next = 0.0;
-}
-
-/* Copies what drawing n normal numbers may change. Each takes two words, in pairs. The words
- * themselves change only when all are used. */
-static inline void copy_for(generator *copy, const generator *it, uint32_t n) {
-    copy->place = it->place;
-    copy->has_next = it->has_next;
-    copy->next = it->next;
-    if (it->place + 2 * (n + 1) > GENERATOR_WORDS) memcpy(copy->words, it->words, sizeof it->words);
 }
 
 static uint32_t twisted(uint32_t upper, uint32_t lower, uint32_t distant) {

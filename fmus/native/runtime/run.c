@@ -204,6 +204,15 @@ static double end_of_step(double start, double time, double step) {
     return time == start + k * step ? start + (k + 1.0) * step : time + step;
 }
 
+/* Copies what drawing n normal numbers may change. Each takes two words, in pairs. The words
+ * themselves change only when all are used. */
+static inline void copy_for(generator *copy, const generator *it, uint32_t n) {
+    copy->place = it->place;
+    copy->has_next = it->has_next;
+    copy->next = it->next;
+    if (it->place + 2 * (n + 1) > GENERATOR_WORDS) memcpy(copy->words, it->words, sizeof it->words);
+}
+
 /* Computes the next moment, and makes it the present one if all its values are valid. */
 static int advance(instance *it, double time, double step, message *why) {
     run *run = &it->run;
