@@ -332,6 +332,8 @@ class _Definition:
         self._emitter, self._function = emitter, function
         self._addressed = emitter.shared(function)
         self._parts = self._addressed - emitter.addressed(function)
+        #: Variables that keep results whose address is taken, and their declarations.
+        self._results: dict[str, str] = {}
 
     def text(self) -> str:
         """Return the definition of the function."""
@@ -346,6 +348,11 @@ class _Definition:
         name = f"{emitter.declared(function.returns)}{emitter.names[function]}"
         head = lines_of(f"static {name}({_list(given) or 'void'}) {{", "")
         body = self._block(function.body, {*function.arguments}, INDENT)
+        # A line that is too long is written twice.
+        written = "\n".join(body)
+        body[:0] = [
+            line for name, line in self._results.items() if re.search(rf"\b{name}\b", written)
+        ]
         if function.returns != NOTHING and not _ends(function.body):
             body.append(f"{INDENT}{self._left()}")
         return "\n".join([*_comment(function.doc), *head, *body, "}"])
@@ -403,7 +410,14 @@ class _Definition:
             root = root.owner
         if isinstance(root, (Local, tree.Constant, Make)):
             return f"&{self.expression(expression, _UNARY)}"
-        return f"({self._emitter.type(expression.type)}[1]){{{self.expression(expression)}}}"
+        return self._kept(expression)
+
+    def _kept(self, expression: Expression) -> str:
+        """Return the address of a result, which a variable keeps."""
+        # No variable of Python has such a name in C.
+        name = f"_result{len(self._results)}"
+        self._results[name] = f"{INDENT}{self._emitter.declared(expression.type)}{name};"
+        return f"({name} = {self.expression(expression)}, &{name})"
 
     def _member(self, expression: Expression) -> str:
         """Return a structure with the operator for access to a member."""
@@ -419,7 +433,7 @@ class _Definition:
         if not isinstance(root, (Call, Choice)):
             return self._member(expression)
         # In C99, the lifetime of a result may end before its element is read.
-        return f"({self._emitter.type(expression.type)}[1]){{{self.expression(expression)}}}->"
+        return f"{self._kept(expression)}->"
 
     def _initial(self, expression: Expression) -> str:
         """Return a value in a context that determines its type."""
