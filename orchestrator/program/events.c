@@ -49,7 +49,7 @@ typedef struct {
 static int look_ahead(course *of) {
     if (!HAS_PASSING || of->is_ahead) return WELL;
     *of->ahead = *of->it;
-    if (PASS(of->ahead, of->it->made, time_after(of->it, of->it->made))) {
+    if (pass_now(of->ahead)) {
         refused(of->it, of->ahead->component, of->ahead->call, of->ahead->port);
         return REFUSED;
     }
@@ -247,7 +247,7 @@ static int act(course *of) {
 
 /* Completes the current row, which no step follows. */
 static void show_last(simulation *it, double rows[]) {
-    if (it->shown > it->made || PASS(it, it->made, time_after(it, it->made))) return;
+    if (it->shown > it->made || pass_now(it)) return;
     keep(it, it->made, rows);
 }
 

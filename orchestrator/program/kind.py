@@ -274,13 +274,17 @@ class Kind:
         name = self.emitter.type(type_)
         # All differ: a difference of equal numbers would be zero.
         large = ", ".join(f"{_LARGE / (1.0 + 0.37 * i)!r}" for i in range(n))
+        differing = [
+            f"!same_bits({a.text}, {b.text})" if a.type == FLOAT else f"{a.text} != {b.text}"
+            for a, b in zip(scalars(type_, "all"), scalars(type_, "none"), strict=True)
+        ]
         noisy = [
             "Error other = {0}, *error = &other;",
             "(void)error;",
             f"const double large[{n}] = {{{large}}};",
             f"const {name} none = {'0.0' if isinstance(type_, Scalar) else '{0}'};",
             f"const {name} all = {self._measured('large', 'none')};",
-            "it->is_noisy = memcmp(&all, &none, sizeof all) != 0;",
+            f"it->is_noisy = {' || '.join(differing) or '0'};",
         ]
         return [
             "it->has_noise = 1;",

@@ -131,11 +131,18 @@ static inline double sum_of_squares(const double values[], int n) {
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
+static inline int same_bits(double a, double b) {
+    uint64_t x = 0, y = 0;
+    memcpy(&x, &a, sizeof a);
+    memcpy(&y, &b, sizeof b);
+    return x == y;
+}
+
 /* Assigns a value to an input. Returns 0 if its bits are the same, 1 if it differs by a rounding
  * error, else 3. */
 static inline int take(double *input, double value) {
     const double before = *input;
-    if (memcmp(&before, &value, sizeof value) == 0) return 0;
+    if (same_bits(before, value)) return 0;
     *input = value;
     return fabs(value - before) <= 1e-12 + 1e-12 * fabs(before) ? 1 : 3;
 }
@@ -388,7 +395,8 @@ class Equations:
         structures, functions = self._structures, self._functions
         equations = self.emitter.text()
         if self._is_inlined:
-            equations = re.sub(r"^static (?=[\w ]+[ *]\w+\()", "WITHIN ", equations, flags=re.M)
+            head = r"^static (inline )?(?=[\w ]+[ *]\w+\()"
+            equations = re.sub(head, "WITHIN ", equations, flags=re.M)
         return [
             _HEADS[self._is_inlined],
             equations,
@@ -967,13 +975,14 @@ class Text:
             return []
         acts_at_end = int(self.plan.experiment.acting_row)
         lines, gives, n = ["const double h = t - it->looked;"], [], 0
+        lines.append(f"Error errors[{len(self.indices)}] = {{{{0}}}};")
         for i, (reducer, sources) in enumerate(self.indices):
             text = self.reducers[id(reducer)]
             source_of = dict(zip((port.name for port in reducer.ports), sources, strict=True))
             row = text.row(lambda port, source_of=source_of: self._source(source_of[port.name]))  # type: ignore[misc]
             look = (
                 f"{text.name}_look(&it->index_{i}, {row}, {acts_at_end}, t, h, it->start_time, "
-                "it->stop_time, &(Error){0});"
+                f"it->stop_time, &errors[{i}]);"
             )
             if reducer.last is not None:
                 last = number_in_c(reducer.last)
@@ -1243,18 +1252,22 @@ class Text:
         """Return the parts of the program that change values between steps."""
         if not self.alters:
             return []
-        error = "fresh(it)" if self.is_stepped else "&(Error){0}"
-        passed = f"pass(it, k, t, {error})" if self.passes else "0"
+        passed = "pass(it, it->made, time_after(it, it->made), error)" if self.passes else "0"
+        pass_now = _function(
+            "Passes present values on, if any pass. Returns 1 if a component refuses.",
+            "static int pass_now(simulation *it)",
+            [*([self._noted] * self.passes), f"return {passed};"],
+            ("it",),
+        )
         reason = "it->noted.why.text" if self.keeps_messages else '""'
         defined = [
             f"enum {{ HAS_PASSING = {int(self.passes)} }};",
-            f"#define PASS(it, k, t) {passed}",
             f"#define REASON(it) {reason}",
         ]
         restarts = [self._restart(), self._restarts()] if self.has_events else []
         sources = [_CHANGES, *[_EVENTS] * self.has_events, *[_STEPPING] * self.is_stepped]
         texts = [path.read_text(encoding="utf-8").strip() for path in sources]
-        return ["\n".join(defined), self._retune(), *restarts, *texts]
+        return ["\n".join(defined), pass_now, self._retune(), *restarts, *texts]
 
     def _retune(self) -> str:
         """Return the function that adopts parameters of a component that changed between steps."""

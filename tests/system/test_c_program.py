@@ -13,9 +13,15 @@ import pytest
 
 from orchestrator import simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim import Experiment, make_plan
+from orchestrator.program.components import definitions_of
 from orchestrator.program.files import _PASSAGES
+from orchestrator.program.writer import Text, indices_of
+from orchestrator.runs.preparation import load
 from orchestrator.runs.result import Result
 from orchestrator.runs.tables import read_columns, read_rows
+from orchestrator.vehicle.indices import INDICES
+from orchestrator.vehicle.signals import loops_of
 from support.texts import mentions
 
 #: Communication step of the scenarios [s].
@@ -28,7 +34,7 @@ SCENARIOS = {"fig4": 1000, "path": 400, "sea": 100}
 #: Scenarios with single precision.
 SINGLE = ["fig4", "path"]
 
-GCC, ARM_GCC, QEMU = map(shutil.which, ("gcc", "arm-none-eabi-gcc", "qemu-system-arm"))
+GCC, GPP, ARM_GCC, QEMU = map(shutil.which, ("gcc", "g++", "arm-none-eabi-gcc", "qemu-system-arm"))
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 needs_arm = pytest.mark.skipif(ARM_GCC is None, reason="arm-none-eabi-gcc is not installed")
 
@@ -299,3 +305,16 @@ def test_scenarios_beyond_single_precision_are_refused(
     assert main(["export", "fig4", "--single"]) != 0
     assert mentions(capsys.readouterr().err, "--single --format c")
     assert not (tmp_path / "one").exists()
+
+
+@pytest.mark.skipif(GPP is None, reason="g++ is not installed")
+def test_quick_programs_are_cpp_too():
+    """With the indices of a fleet, and for single steps."""
+    system, stepped = load("formation-v", "native"), load("remus", "native")
+    reducers = dict.fromkeys(index.reducer for index in INDICES)
+    indices = [index for loop in loops_of(system) for index in indices_of(system, loop, reducers)]
+    for part, options in ((system, {"indices": indices}), (stepped, {"is_stepped": True})):
+        plan = make_plan(part, Experiment(1.0, H))
+        text = Text(plan, definitions_of(part), is_quick=True, **options).text()
+        command = [GPP, "-x", "c++", "-std=c++20", "-w", "-fsyntax-only", "-"]
+        subprocess.run(command, input=text, text=True, check=True)
