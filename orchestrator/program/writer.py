@@ -1040,27 +1040,18 @@ class Text:
         )
         lines = [self._noted]
         if self.passes:
+            # The host of single steps asks for the last row.
+            last = " || (it->made == it->steps && it->shown == it->steps)" * (not self.is_stepped)
             known = "!it->is_passed && " * self.is_stepped
-            row = [
-                f"if ({known}pass(it, k, time_after(it, k), error)) return 1;",
-                "keep(it, k, rows);",
-            ]
-            last = [
-                "if (it->made == it->steps && it->shown == it->steps) {",
-                "    const int k = it->made;",
-                *(f"    {line}" for line in row),
-                "}",
-            ]
             lines += [
-                "while (it->made < until) {",
+                f"while (it->made < until{last}) {{",
                 "    const int k = it->made;",
-                *(f"    {line}" for line in row),
-                *(["    it->is_passed = 0;"] * self.is_stepped),
+                f"    if ({known}pass(it, k, time_after(it, k), error)) return 1;",
+                "    keep(it, k, rows);",
+                "    it->is_passed = 0;" if self.is_stepped else "    if (k == it->steps) break;",
                 "    if (make_step(it, k, time_after(it, k), error)) return 1;",
                 "    it->made = k + 1;",
                 "}",
-                # The host of single steps asks for the last row.
-                *([] if self.is_stepped else last),
             ]
         else:
             lines += [
