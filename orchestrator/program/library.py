@@ -25,6 +25,7 @@ from orchestrator.machine.compilers import (
     zig,
 )
 from orchestrator.machine.errors import InputError, reason
+from fmus.ports.port import H_MAX
 from orchestrator.program.writer import Text
 
 #: Category in the cache.
@@ -50,6 +51,9 @@ class Source:
         text: text in C.
         parameters: names of its parameters, in their order.
         columns: names of the columns of its rows, without the time.
+        places: of its parameters in C; empty for one that is changed at the start.
+        noises: places of its generators in C.
+        is_stepped: True if a host makes single steps.
         n_indices: number of values of its indices.
         library: compiled library; empty: not compiled yet.
         machine: machine of the library.
@@ -60,6 +64,9 @@ class Source:
     parameters: Sequence[str]
     columns: Sequence[str]
     n_indices: int
+    places: Sequence[str]
+    noises: Sequence[str]
+    is_stepped: bool
     library: bytes = field(default=b"", repr=False)
     machine: str = platform_tuple
 
@@ -67,7 +74,15 @@ class Source:
     def of(cls, text: Text) -> Source:
         """Make the source of a text."""
         n = sum(len(ports) for index in text.indices for ports in index.reducer.results.values())
-        return cls(text.text(), tuple(map(str, text.parameters)), tuple(map(str, text.columns)), n)
+        return cls(
+            text.text(),
+            tuple(map(str, text.parameters)),
+            tuple(map(str, text.columns)),
+            n,
+            tuple("" if name.port == H_MAX else place.text for name, place in text.parameters.items()),
+            tuple(text.noises),
+            text.is_stepped,
+        )
 
     def with_library(self) -> Source:
         """Return the source with the library that this machine has compiled."""

@@ -62,15 +62,20 @@ static void go_on(simulation *it, int until) {
     if (!it->has_failed) it->has_failed = run(it, until, NULL) || come_up_to_date(it);
 }
 
+/* Begins one with parameters. */
+static void begin_one(simulation *it, const double parameters[], double start_time, double step,
+                      double stop_time, int steps) {
+    const int refused = begin(it, parameters, start_time, step, stop_time, steps, steps);
+    it->has_failed = refused;
+    go_on(it, 0);
+}
+
 /* Begins those whose numbers are given, with a row of parameters for each. */
 EXPORTED void begin_all(char *all, int n, const int which[], const double parameters[],
                         double start_time, double step, double stop_time, int steps) {
     for (int i = 0; i < n; i++) {
-        simulation *it = at(all, which[i]);
         const double *own = parameters + (size_t)which[i] * SETTABLES;
-        const int refused = begin(it, own, start_time, step, stop_time, steps, steps);
-        it->has_failed = refused;
-        go_on(it, 0);
+        begin_one(at(all, which[i]), own, start_time, step, stop_time, steps);
     }
 }
 

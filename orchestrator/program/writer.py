@@ -73,7 +73,7 @@ EXPORTED = """\
 _HEADS = {
     False: "#ifndef APART\n#define APART static\n#endif",
     True: (
-        "#if defined(__GNUC__)\n"
+        "#ifdef APART\n#elif defined(__GNUC__)\n"
         "#define APART static __attribute__((noinline))\n"
         "#define WITHIN static inline __attribute__((always_inline))\n"
         "#else\n#define APART static\n#define WITHIN static inline\n#endif"
@@ -100,33 +100,47 @@ int(raise_error)(Error *error, const char *what, ...);
 _STRING = "typedef const char *string;"
 
 _CHECKS = """\
+/* Before a loop, where a compiler has to be told. */
+#ifndef UNROLLED
+#define UNROLLED
+#endif
+
 /* Partial sums, for vector instructions. */
 enum { LANES = 4 };
 
 static inline double sum_of(const double values[], int n) {
     double sums[LANES] = {0.0};
     int i = 0, j;
+    UNROLLED
     for (; i + LANES <= n; i += LANES) {
+        UNROLLED
         for (j = 0; j < LANES; j++) sums[j] += values[i + j];
     }
+    UNROLLED
     for (; i < n; i++) sums[0] += values[i];
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
 /* True if all values are finite. Usually their sum shows it; large ones may overflow. */
 static inline int are_finite(const double values[], int n) {
-    int i = 0;
+    int i;
     if (isfinite(sum_of(values, n))) return 1;
-    while (i < n && isfinite(values[i])) i++;
-    return i == n;
+    UNROLLED
+    for (i = 0; i < n; i++) {
+        if (!isfinite(values[i])) return 0;
+    }
+    return 1;
 }
 
 static inline double sum_of_squares(const double values[], int n) {
     double sums[LANES] = {0.0};
     int i = 0, j;
+    UNROLLED
     for (; i + LANES <= n; i += LANES) {
+        UNROLLED
         for (j = 0; j < LANES; j++) sums[j] += values[i + j] * values[i + j];
     }
+    UNROLLED
     for (; i < n; i++) sums[0] += values[i] * values[i];
     return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
@@ -153,7 +167,8 @@ static inline int take_whole(int *input, int value) {
     return is_other ? 3 : 0;
 }"""
 
-_DRAWING = """\
+#: Draws from a generator.
+DRAWING = """\
 static inline void draw_normals(generator *noise, double draws[], int n) {
     for (int i = 0; i < n; i++) draws[i] = standard_normal(noise);
 }"""
@@ -401,7 +416,7 @@ class Equations:
             _HEADS[self._is_inlined],
             equations,
             _CHECKS,
-            *([_DRAWING] if self.is_noisy else []),
+            *([DRAWING] if self.is_noisy else []),
             *structures,
             *functions,
         ]
@@ -610,6 +625,13 @@ class Text:
             inputs = self._inputs(name).items()
             places |= {port: place for port, place in inputs if port not in fed}
         return places
+
+    @property
+    def noises(self) -> Iterator[str]:
+        """Places of the generators of random numbers."""
+        for name, member in self.members.items():
+            if self.kind(name).behaviour.draws:
+                yield f"it->{member}.noise"
 
     def start(self, name: PortName, system: System | None = None) -> float | int | bool:
         """Return the value of a parameter or an unconnected input at the start.
