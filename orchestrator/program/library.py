@@ -66,8 +66,8 @@ class Source:
     @classmethod
     def of(cls, text: Text) -> Source:
         """Make the source of a text."""
-        n = sum(len(ports) for index in text.indices for ports in index.reducer.results.values())
-        return cls(text.text(), tuple(map(str, text.parameters)), tuple(map(str, text.columns)), n)
+        parameters, columns = tuple(map(str, text.parameters)), tuple(map(str, text.columns))
+        return cls(text.text(), parameters, columns, text.n_indices)
 
     def with_library(self) -> Source:
         """Return the source with the library that this machine has compiled."""
