@@ -63,6 +63,11 @@ class Reducer:
     meanings: Mapping[str, str]
     last: float | None
 
+    @property
+    def n_results(self) -> int:
+        """Number of the values of its indices."""
+        return sum(map(len, self.results.values()))
+
     def arguments(self, name: str) -> tuple[str, ...]:
         """Return the arguments of a hook, in its own order."""
         return tuple(signature(self.hooks[name]).parameters)

@@ -9,13 +9,16 @@ from importlib.util import find_spec
 from math import nan
 from queue import SimpleQueue
 from threading import Lock
-from typing import Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.program.cuda import OPTIONS, in_cuda
-from orchestrator.program.library import Grids, Source
+from orchestrator.program.library import Source
+
+if TYPE_CHECKING:
+    from orchestrator.program.library import Grids
 
 #: Threads of a block: with 255 registers each, two blocks fill a multiprocessor.
 _THREADS = 128
@@ -190,7 +193,9 @@ class CardProgram:
         with self._lock:
             if self._same is None:
                 self._same = dict(enumerate(values[0].tolist()))
-            is_same = (values == [self._same.get(i, nan) for i in range(values.shape[1])]).all(axis=0)
+            is_same = (values == [self._same.get(i, nan) for i in range(values.shape[1])]).all(
+                axis=0
+            )
             if not is_same[[*self._same]].all():
                 self._same = {i: value for i, value in self._same.items() if is_same[i]}
             return self._same

@@ -11,6 +11,7 @@ from threading import local
 import numpy as np
 from fmpy import platform_tuple
 
+from fmus.ports.port import H_MAX
 from orchestrator.cosim import Experiment
 from orchestrator.machine.cache import read_cached
 from orchestrator.machine.compilers import (
@@ -25,7 +26,6 @@ from orchestrator.machine.compilers import (
     zig,
 )
 from orchestrator.machine.errors import InputError, reason
-from fmus.ports.port import H_MAX
 from orchestrator.program.writer import Text
 
 #: Category in the cache.
@@ -73,16 +73,14 @@ class Source:
     @classmethod
     def of(cls, text: Text) -> Source:
         """Make the source of a text."""
-        n = sum(len(ports) for index in text.indices for ports in index.reducer.results.values())
-        return cls(
-            text.text(),
-            tuple(map(str, text.parameters)),
-            tuple(map(str, text.columns)),
-            n,
-            tuple("" if name.port == H_MAX else place.text for name, place in text.parameters.items()),
-            tuple(text.noises),
-            text.is_stepped,
+        parameters, columns = tuple(map(str, text.parameters)), tuple(map(str, text.columns))
+        places = tuple(
+            "" if name.port == H_MAX else place.text for name, place in text.parameters.items()
         )
+        return cls(
+            text.text(), parameters, columns, text.n_indices, places, tuple(text.noises),
+            text.is_stepped,
+        )  # fmt: skip
 
     def with_library(self) -> Source:
         """Return the source with the library that this machine has compiled."""

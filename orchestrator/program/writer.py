@@ -294,6 +294,17 @@ _BEGINNING = (
 #: Place of the output `fault` of a component that has refused nothing.
 _NO_FAULT = Place("it->no_fault", INT)
 
+#: Statements that take the distances of all two vehicles; they are compared as squares.
+_CLOSEST = (
+    "for (int i = 1; i < VEHICLES; i++) {",
+    "    for (int k = 0; k < i; k++) {",
+    "        const double x = at[i][0] - at[k][0], y = at[i][1] - at[k][1];",
+    "        const double z = at[i][2] - at[k][2];",
+    "        it->closest = smaller(it->closest, x * x + y * y + z * z);",
+    "    }",
+    "}",
+)
+
 #: An error within a function, and one that the simulation keeps.
 _NOTED = "Error noted = {0}, *error = &noted;"
 _KEPT = "Error *error = fresh(it);"
@@ -513,6 +524,8 @@ class Text:
         plan: plan of its run.
         definitions: definitions of its components, by component.
         indices: indices that it computes.
+        loops: vehicles; it also computes the smallest distance of several, if their positions are
+            outputs.
         is_tuned: if set, parameters may change after the start.
         is_hosted: if set, a host passes the time of each step.
         has_events: if set, events can happen.
@@ -526,6 +539,7 @@ class Text:
     plan: Plan
     definitions: Mapping[str, Definition]
     indices: Sequence[Index] = ()
+    loops: Sequence[Loop] = ()
     is_tuned: bool = False
     is_hosted: bool = False
     has_events: bool = False
@@ -605,6 +619,13 @@ class Text:
             for name, _, _, ports in self.plan.system.columns()
             for port in (PortName(name, variable.name) for variable in ports)
         }
+
+    @cached_property
+    def positions(self) -> list[list[str]]:
+        """Places of the positions of several vehicles; empty if one is not an output."""
+        places = {str(name): place.text for name, place in self.columns.items()}
+        positions = [[places.get(name, "") for name in loop.position] for loop in self.loops]
+        return positions if len(positions) > 1 and all(map(all, positions)) else []
 
     @cached_property
     def inputs(self) -> dict[PortName, int]:
@@ -756,6 +777,8 @@ class Text:
             rows.append(f"{self.reducers[id(reducer)].name} index_{i};")
         if self.indices:
             rows.append("double looked; /* time of the last row that indices took [s] */")
+        if self.positions:
+            rows.append("double closest; /* smallest squared distance of two vehicles [m2] */")
         if self.alters:
             n = len(self.inputs)
             rows += [
@@ -795,6 +818,7 @@ class Text:
             "it->stop_time = stop_time;",
             "it->full_steps = full_steps;",
             "it->steps = steps;",
+            *(["it->closest = INFINITY;"] if self.positions else []),
             *(_BEGINNING if self.alters else self.set_parameters()),
             *self.unsplit(),
             "return come_to_rest(it, error) != 0;",
@@ -993,11 +1017,13 @@ class Text:
 
     def _look(self) -> list[str]:
         """Return the functions that pass a row to the indices, and that give the indices."""
-        if not self.indices:
+        if not self.n_indices:
             return []
         acts_at_end = int(self.plan.experiment.acting_row)
-        lines, gives, n = ["const double h = t - it->looked;"], [], 0
-        lines.append(f"Error errors[{len(self.indices)}] = {{{{0}}}};")
+        lines, gives, n = list[str](), list[str](), 0
+        if self.indices:
+            lines.append("const double h = t - it->looked;")
+            lines.append(f"Error errors[{len(self.indices)}] = {{{{0}}}};")
         for i, (reducer, sources) in enumerate(self.indices):
             text = self.reducers[id(reducer)]
             source_of = dict(zip((port.name for port in reducer.ports), sources, strict=True))
@@ -1015,8 +1041,17 @@ class Text:
                 f"{text.name}_give(&it->index_{i}, it->looked, it->start_time, it->stop_time, "
                 f"found + {n}, error);",
             ]
-            n += sum(map(len, reducer.results.values()))
-        lines.append("it->looked = t;")
+            n += reducer.n_results
+        if self.indices:
+            lines.append("it->looked = t;")
+        if self.positions:
+            positions = ", ".join(f"{{{', '.join(places)}}}" for places in self.positions)
+            lines += [
+                f"enum {{ VEHICLES = {len(self.positions)} }};",
+                f"const double at[VEHICLES][3] = {{{positions}}};",
+                *_CLOSEST,
+            ]
+            gives.append(f"found[{n}] = sqrt(it->closest);")
         give_lines = [
             _NOTED,
             "int raised = 0;",
@@ -1028,9 +1063,9 @@ class Text:
                 "Passes the current row to the indices.",
                 "static void look(simulation *it, double t)",
                 lines,
-                (),
+                ("t",),
             ),
-            f"enum {{ INDICES = {n} }};",
+            f"enum {{ INDICES = {self.n_indices} }};",
             _function(
                 "Gives the indices of the rows so far, NaN for missing ones. Returns how many have "
                 "raised an error.",
@@ -1040,6 +1075,11 @@ class Text:
             ),
         ]
 
+    @property
+    def n_indices(self) -> int:
+        """Number of values of the indices; the smallest distance is the last."""
+        return sum(index.reducer.n_results for index in self.indices) + bool(self.positions)
+
     def _source(self, source: PortName | float) -> str:
         if isinstance(source, PortName):
             return (self.columns.get(source) or self.parameters[source]).text
@@ -1048,7 +1088,7 @@ class Text:
     # Steps
 
     def _run(self) -> Iterator[str]:
-        looks = ["look(it, t);"] * bool(self.indices)
+        looks = ["look(it, t);"] * bool(self.n_indices)
         yield _function(
             "Writes the row after k steps, and passes it to the indices.",
             "static void keep(simulation *it, int k, double rows[])",

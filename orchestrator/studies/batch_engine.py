@@ -42,7 +42,7 @@ from orchestrator.vehicle.cautions import (
     cautions_of,
     values_of,
 )
-from orchestrator.vehicle.indices import INDICES, SMALLEST_DISTANCE, prefixed, smallest_of
+from orchestrator.vehicle.indices import INDICES, SMALLEST_DISTANCE, prefixed
 from orchestrator.vehicle.signals import loops_of
 
 #: Advice for systems that this engine cannot run.
@@ -147,7 +147,7 @@ class _Programs:
         reducers = [*dict.fromkeys(index.reducer for index in indices), *WATCHED]
         plan = make_plan(system, Experiment(step * 2.0**20, step, order))
         looking = [[*indices_of(system, loop, reducers)] for loop in self.loops]
-        text = Text(plan, self._definitions, [*chain(*looking)], is_quick=True)
+        text = Text(plan, self._definitions, [*chain(*looking)], self.loops, is_quick=True)
         groups, watched, first = [], [], 0
         for (_, prefix), looks in zip(prefixed(self.loops), looking, strict=True):
             places: dict[str, int] = {}
@@ -162,6 +162,8 @@ class _Programs:
             ]
             names = (name for reducer in WATCHED for name in reducer.results)
             watched.append({name: places[name] for name in names if name in places})
+        if text.positions:
+            groups.append({SMALLEST_DISTANCE: first})
         return _Compiled(Source.of(text), groups, watched)
 
     def plain(self, point: Point) -> Point:
@@ -216,13 +218,6 @@ class _Programs:
             for name, definition in self._definitions.items()
             for port in definition.ports
         }
-
-    def positions(self, compiled: _Compiled, rows: np.ndarray) -> np.ndarray:
-        """Return the positions of all vehicles in rows."""
-        places = {name: i for i, name in enumerate(compiled.source.columns, 1)}
-        return np.stack(
-            [rows[:, [places[name] for name in loop.position]] for loop in self.loops], axis=1
-        )
 
     def result(
         self, compiled: _Compiled, point: Point, experiment: Experiment, rows: np.ndarray
@@ -344,21 +339,16 @@ class BatchEngine:
             values = programs.values(compiled, point.parameters)
         except Refusal:
             return Outcome(point.number, {}, REFUSED)
-        is_fleet = len(programs.loops) > 1
         rows = None
-        if is_fleet or self.functions:
+        if self.functions:
             rows = np.empty((experiment.rows, 1 + len(compiled.source.columns)))
         results = compiled.program.run(values, experiment, rows)
         if results is None:
             return Outcome(point.number, {}, REFUSED)
         numbers = results.tolist()
-        indices: dict[str, float] = {}
-        if is_fleet and rows is not None:
-            distances = smallest_of(programs.positions(compiled, rows))
-            indices[SMALLEST_DISTANCE] = float(distances.min())
-        indices |= compiled.indices(numbers)
+        indices = compiled.indices(numbers)
         outcome = Outcome(point.number, indices, None, programs.cautions(compiled, point, numbers))
-        if rows is None or not self.functions:
+        if rows is None:
             return outcome
         return with_functions(
             outcome, self.functions, programs.result(compiled, point, experiment, rows)

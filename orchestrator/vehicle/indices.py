@@ -247,18 +247,14 @@ def distances(table: Table, loops: Sequence[Loop]) -> dict[tuple[str, str], np.n
 
 def smallest_distances(table: Table, loops: Sequence[Loop]) -> np.ndarray:
     """Return the distance between the two closest vehicles, per row [m]."""
-    return smallest_of(np.stack([table.group(*loop.position) for loop in loops], axis=1))
-
-
-def smallest_of(positions: np.ndarray) -> np.ndarray:
-    """Return the smallest distance of each row [m], for positions (rows, vehicles, 3) [m]."""
+    positions = np.stack([table.group(*loop.position) for loop in loops], axis=1)
     rows = max(1, _AT_ONCE // positions.shape[1])
     blocks = np.split(positions, range(rows, len(positions), rows))
     return np.concatenate([_smallest(block) for block in blocks])
 
 
 def _smallest(positions: np.ndarray) -> np.ndarray:
-    """Return the smallest distance of each row, without blocks."""
+    """Return the smallest distance of each row [m], for positions (rows, vehicles, 3) [m]."""
     squares = np.full(len(positions), np.inf)
     for i in range(1, positions.shape[1]):
         apart = positions[:, i:] - positions[:, :-i]

@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Iterable, Mapping, Sequence
 from ctypes import CDLL, c_char_p, c_double, c_int, c_size_t, c_void_p, create_string_buffer
 from functools import cache, partial
-from itertools import chain, product
+from itertools import product
 from math import isnan
 from typing import Any, NamedTuple
 
@@ -239,7 +239,7 @@ class _Compiled:
             Raised: a hook has raised an exception.
 
         """
-        array = np.empty(sum(1 for _ in chain(*self._reducer.results.values())))
+        array = np.empty(self._reducer.n_results)
         run = self._run
         if self._library.give_numbers(
             self._memory, run.start_time, run.stop_time, array.ctypes.data

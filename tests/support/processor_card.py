@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from orchestrator.machine.compilers import (
-    Compiler,
     MATHEMATICS,
     SAME_NUMBERS,
+    Compiler,
     compile_text,
     load_library,
     machines_compiler,

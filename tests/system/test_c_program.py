@@ -312,8 +312,10 @@ def test_quick_programs_are_cpp_too():
     """With the indices of a fleet, and for single steps."""
     system, stepped = load("formation-v", "native"), load("remus", "native")
     reducers = dict.fromkeys(index.reducer for index in INDICES)
-    indices = [index for loop in loops_of(system) for index in indices_of(system, loop, reducers)]
-    for part, options in ((system, {"indices": indices}), (stepped, {"is_stepped": True})):
+    loops = loops_of(system)
+    indices = [index for loop in loops for index in indices_of(system, loop, reducers)]
+    of_fleet = {"indices": indices, "loops": loops}
+    for part, options in ((system, of_fleet), (stepped, {"is_stepped": True})):
         plan = make_plan(part, Experiment(1.0, H))
         text = Text(plan, definitions_of(part), is_quick=True, **options).text()
         command = [GPP, "-x", "c++", "-std=c++20", "-w", "-fsyntax-only", "-"]
