@@ -14,6 +14,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.cosim import Plan, System
 from orchestrator.figures.study_values import FigureEntry, Values
@@ -28,7 +30,8 @@ from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.blocks import Blocks, local_threads, local_workers
-from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
+from orchestrator.studies.columns import Numbers, Outcomes, Point, Points
+from orchestrator.studies.engine import Engine, FmuEngine
 from orchestrator.studies.own_functions import OwnFunction, own_functions
 from orchestrator.studies.own_indices import OwnIndex, own_indices, with_fields
 from orchestrator.studies.space import Space
@@ -292,14 +295,13 @@ def with_columns(
     names = tuple(f"index {function.name}: " for function in functions)
     workers = 1 if means.scheduler is None else None
     for number in range(min(_TRIED, len(space))):
+        points = [space.points(np.array([number]))]
         # As all others are made, since an FMU may end its process.
-        with making_runs(
-            engine, [space[number]], scheduler=means.scheduler, workers=workers
-        ) as blocks:
-            [outcome] = chain(*blocks)
-        failure = outcome.failure
+        with making_runs(engine, points, scheduler=means.scheduler, workers=workers) as blocks:
+            [outcomes] = blocks
+        [failure] = outcomes.failures.each()
         if failure is None:
-            known = [function.with_columns(outcome.indices) for function in functions]
+            known = [function.with_columns(outcomes.columns) for function in functions]
             columns = [*chain(*(function.columns for function in known))]
             taken = {
                 *space.columns,
@@ -417,11 +419,11 @@ def _record(study: Study, ready: Ready, command: Sequence[str]) -> dict[str, Any
 @contextmanager
 def making_runs(
     engine: Engine,
-    points: Iterable[Point],
+    points: Iterable[Points],
     *,
     scheduler: str | None = None,
     workers: int | None = None,
-) -> Iterator[Iterator[list[Outcome]]]:
+) -> Iterator[Iterator[Outcomes]]:
     """Yield an iterator over the outcomes of runs, block by block as they are done.
 
     Runs are taken from their iterator when they are needed. Each has one outcome; that of a run
@@ -429,7 +431,7 @@ def making_runs(
 
     Args:
         engine: that makes the runs.
-        points: runs to make.
+        points: runs to make, some at a time.
         scheduler: address of a Dask scheduler; None for processes or threads of this machine.
         workers: number of them; None for one per core.
 
@@ -447,7 +449,7 @@ def making_runs(
     else:
         pool = local_workers(workers, engine)
     with pool as started:
-        yield Blocks(started).outcomes(points)
+        yield Blocks(started, engine).outcomes(points)
 
 
 def _complete(
@@ -471,17 +473,15 @@ def _complete(
         delay=_PATIENCE,
         disable=None if name else True,
     ) as bar:
-        left: Iterable[int] = store.missing(len(space))
+        left = store.missing(len(space))
         for engine in engines:
-            points, refused = (space[number] for number in left), list[int]()
+            points, refused = map(space.points, left.blocks(engine.most_runs)), Numbers()
             outcomes = making_runs(engine, points, scheduler=means.scheduler, workers=means.workers)
             with outcomes as blocks:
                 for block in blocks:
-                    done = [outcome for outcome in block if outcome.failure != REFUSED]
-                    refused += [outcome.number for outcome in block if outcome.failure == REFUSED]
-                    store.add(done)
-                    bar.update(len(done))
-            if not refused:
-                break
-            left = sorted(refused)
-    store.publish(space)
+                    is_refused = block.failures.has(REFUSED)
+                    refused.add(Numbers.of(block.numbers[is_refused]))
+                    store.add(block[~is_refused])
+                    bar.update(len(block) - int(is_refused.sum()))
+            left = refused
+        store.publish(space)
