@@ -7,7 +7,7 @@ from ctypes import CDLL, c_double, c_int, c_size_t, c_void_p, create_string_buff
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import local
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from fmpy import platform_tuple
@@ -136,10 +136,6 @@ class Program:
 
     """
 
-    #: Number of runs that take about as long as a single one, and largest number at a time.
-    least_runs: ClassVar[int] = 1
-    most_runs: ClassVar[int] = 10_000
-
     def __init__(self, source: Source) -> None:
         """Compile a program, unless it is in the cache.
 
@@ -213,6 +209,74 @@ class Program:
             or library.run(memory, grid[-1], None if rows is None else rows.ctypes.data)
             or (self.source.n_indices and library.indices(memory, indices))
         )
+
+
+class Runner(Protocol):
+    """A program that makes runs."""
+
+    def runs(self, values: np.ndarray, grids: Grids) -> tuple[np.ndarray, np.ndarray]:
+        """Make some runs, as :meth:`Program.runs` does."""
+        ...
+
+
+class Runners(Protocol):
+    """What programs run on: the processor, or cards.
+
+    Attributes:
+        least_runs: number of runs that take about as long as a single one.
+        most_runs: largest number of runs at a time.
+
+    """
+
+    least_runs: int
+    most_runs: int
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names for the record of a study."""
+        ...
+
+    @property
+    def threads(self) -> int | None:
+        """Number of blocks to make at a time; None: one for each core."""
+        ...
+
+    def __call__(self, source: Source) -> Runner:
+        """Return a program.
+
+        Raises:
+            InputError: it cannot be compiled.
+
+        """
+        ...
+
+    def portable(self, source: Source) -> Source:
+        """Return a source for another machine."""
+        ...
+
+
+class Processor:
+    """The processor, which makes one run after the other."""
+
+    least_runs, most_runs = 1, 10_000
+    names: Sequence[str] = ()
+    threads: int | None = None
+
+    def __call__(self, source: Source) -> Program:
+        """Return a compiled program.
+
+        Raises:
+            InputError: it cannot be compiled; the message says what to install.
+
+        """
+        return Program(source)
+
+    def portable(self, source: Source) -> Source:
+        """Return a source with the library that this machine has compiled."""
+        return self(source).source.with_library()
+
+
+PROCESSOR = Processor()
 
 
 class _ThreadMemory(local):

@@ -27,7 +27,14 @@ from orchestrator.cosim import (
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
-from orchestrator.program.library import Grids, Program, Source
+from orchestrator.program.library import (
+    PROCESSOR,
+    Grids,
+    Program,
+    Runner,
+    Runners,
+    Source,
+)
 from orchestrator.program.writer import Text, indices_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import PROGRAM
@@ -69,26 +76,33 @@ class _Compiled:
 
     Attributes:
         source: of the program.
-        make: makes its runs.
+        runners: make its runs.
         places: of the columns of indices.
         watched: kinds of cautions, and the places and limits of the values that they depend on.
 
     """
 
     source: Source
-    make: type[Program]
+    runners: Runners
     places: Mapping[str, int]
     watched: Sequence[tuple[str, int, float]]
 
     @cached_property
-    def program(self) -> Program:
+    def program(self) -> Runner:
         """The program, compiled."""
-        return self.make(self.source)
+        return self.runners(self.source)
+
+    @property
+    def on_processor(self) -> Program:
+        """The program, which makes runs with rows."""
+        program = self.program
+        assert isinstance(program, Program)
+        return program
 
     def __getstate__(self) -> Mapping[str, Any]:
         """Return the state without the loaded library; each process loads it."""
         state = {name: value for name, value in self.__dict__.items() if name != "program"}
-        return {**state, "source": self.program.source.with_library()}
+        return {**state, "source": self.runners.portable(self.source)}
 
 
 class _Parameter(NamedTuple):
@@ -140,9 +154,9 @@ class _Programs:
 
     """
 
-    def __init__(self, system: System, own: Sequence[OwnIndex], make: type[Program]) -> None:
+    def __init__(self, system: System, own: Sequence[OwnIndex], runners: Runners) -> None:
         self.system, self.loops = system, loops_of(system)
-        self._own, self._make = own, make
+        self._own, self._runners = own, runners
         self._by_key: dict[_Key, _Compiled] = {}
         self._definitions: Mapping[str, Definition] | None = definitions_of(system)
         self._parameters: tuple[Mapping[str, _Parameter], np.ndarray] | None = None
@@ -194,7 +208,7 @@ class _Programs:
             ]
         if text.positions:
             columns[SMALLEST_DISTANCE] = first
-        return _Compiled(Source.of(text), self._make, columns, watched)
+        return _Compiled(Source.of(text), self._runners, columns, watched)
 
     def plain(self, parameters: Mapping[str, Value]) -> Mapping[str, Value]:
         """Return parameters as single ones: without wildcards and groups."""
@@ -366,7 +380,7 @@ class BatchEngine:
         systems: Mapping[str, System],
         own: Sequence[OwnIndex] = (),
         functions: Sequence[OwnFunction] = (),
-        make: type[Program] = Program,
+        runners: Runners = PROCESSOR,
     ) -> None:
         """Make an engine.
 
@@ -374,19 +388,20 @@ class BatchEngine:
             systems: by the names of scenarios in runs.
             own: the user's own indices.
             functions: those that are functions.
-            make: what makes the runs of a program.
+            runners: what makes the runs of a program.
 
         Raises:
             InputError: a system cannot become a program.
 
         """
         self.functions = functions
-        self.least_runs, self.most_runs = make.least_runs, make.most_runs
+        self.runners = runners
+        self.least_runs, self.most_runs = runners.least_runs, runners.most_runs
         self._programs = dict[str, _Programs]()
         for name, system in systems.items():
             system.check()
             try:
-                self._programs[name] = _Programs(system, own, make)
+                self._programs[name] = _Programs(system, own, runners)
             except InputError as error:
                 raise InputError(f"{name}: {error}; {_ADVICE}") from None
 
@@ -395,15 +410,17 @@ class BatchEngine:
         """Hash of the code that makes programs and indices."""
         return code_of("auv_fmu", "fmus", "orchestrator.program", "orchestrator.vehicle")
 
-    def prepare(self, point: Point) -> None:
-        """Compile the program of a run.
+    def prepare(self, point: Point, is_here: bool = True) -> None:
+        """Translate the program of a run, and compile it if runs are made here.
 
         Raises:
             InputError: its system cannot become a program; the message has the reason.
 
         """
         try:
-            self._programs[point.scenario].compiled(point.order, point.step).program  # noqa: B018
+            compiled = self._programs[point.scenario].compiled(point.order, point.step)
+            if is_here:
+                compiled.program  # noqa: B018
         except InputError as error:
             raise InputError(f"{point.scenario}: {error}; {_ADVICE}") from None
 
@@ -468,7 +485,7 @@ class BatchEngine:
         """Make a run with its rows."""
         [point] = points
         experiment, rows = _with_rows(compiled, point)
-        results = compiled.program.run(values, experiment, rows)
+        results = compiled.on_processor.run(values, experiment, rows)
         if results is None:
             return programs.refused(compiled, case, points)
         made = programs.outcomes(compiled, case, points, results[np.newaxis], np.zeros(1, bool))
@@ -491,7 +508,7 @@ class BatchEngine:
             [values], _ = programs.values(compiled, points.cases[0], points)
         except Refusal as refusal:
             raise InputError(str(refusal)) from None
-        if compiled.program.run(values, experiment, rows) is None:
+        if compiled.on_processor.run(values, experiment, rows) is None:
             raise InputError(f"{point.scenario}: a component has refused")
         return programs.result(compiled, point, experiment, rows)
 

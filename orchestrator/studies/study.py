@@ -34,9 +34,9 @@ from orchestrator.runs.preparation import is_path
 from orchestrator.vehicle.indices import index_columns
 
 #: Engines that make runs; the first is the default.
-EngineName: TypeAlias = Literal["fmu", "batch"]
+EngineName: TypeAlias = Literal["fmu", "batch", "gpu"]
 ENGINES: tuple[EngineName, ...] = get_args(EngineName)
-FMU, BATCH = ENGINES
+FMU, BATCH, GPU = ENGINES
 
 #: Spacings of values between two ends.
 SPACINGS = LINEAR_SPACING, LOG_SPACING = "linear", "log"

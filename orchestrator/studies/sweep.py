@@ -23,6 +23,8 @@ from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import PACKAGES
 from orchestrator.machine.lazy import progress_bar
+from orchestrator.program.card import Cards
+from orchestrator.program.library import PROCESSOR, Runners
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.preparation import Prepared, load_scenario
 from orchestrator.runs.request import FORCE, KIND, LOOP, option
@@ -40,6 +42,7 @@ from orchestrator.studies.study import (
     BATCH,
     ENGINES,
     FMU,
+    GPU,
     EngineName,
     Study,
     read_figures,
@@ -65,6 +68,9 @@ _TRIED = 10
 #: Seconds before a progress bar appears.
 _PATIENCE = 0.5
 
+#: Advice for a machine without a graphics card.
+_INSTEAD = f"--engine {BATCH} makes the same runs on all cores"
+
 #: Name of a study without a file.
 _NAMELESS = "study"
 
@@ -80,8 +86,8 @@ class Means:
 
     engine: EngineName | None = option(
         None,
-        "engine that makes the runs: fmu (the FMUs) or batch (the system as one program); both "
-        "give the same numbers; default: from the study",
+        "engine that makes the runs: fmu (the FMUs), batch (the system as one program; the same "
+        "numbers) or gpu (that program on graphics cards); default: from the study",
     )
     kind: KindName = option(AUTO, KIND)
     loop: Plan.Loop = option(Plan.LOOPS[0], LOOP)
@@ -128,7 +134,7 @@ def sweep(
         study: name of a ready study, path of a .toml file, or a dictionary with its entries.
         indices: your own by their names: functions of the result of a run, which return a number,
             or a list or dictionary of numbers; :meth:`.Result.metrics` tries them on one result.
-        engine: engine that makes the runs, `fmu` or `batch`; None: the study's own.
+        engine: engine that makes the runs, `fmu`, `batch` or `gpu`; None: the study's own.
         kind: kind of the bundle's FMUs: `python`, `native`, or `auto`: the kind with which the
             study began, else native where available.
         loop: loop that makes their steps: `python`, `compiled` or `auto`.
@@ -267,6 +273,11 @@ def prepare_study(study: Study, means: Means, functions: Sequence[OwnFunction] =
         engine = _engine(means.engine or study.engine, space.prepared, means, own)
     if functions:
         findings.refuse()
+        if isinstance(engine, BatchEngine) and engine.runners is not PROCESSOR:
+            raise InputError(
+                f"indices that are functions need rows, which engine {GPU!r} does not keep; use "
+                f"--engine {BATCH}"
+            )
         engine.functions = with_columns(functions, space, own, engine, means)
         space.indices += tuple(chain(*(function.columns for function in engine.functions)))
     with findings.collecting():
@@ -344,11 +355,11 @@ def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
     for scenario, run in prepared.items():
         if run.input_tables:
             raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
-        if name == BATCH and run.events:
-            raise InputError(f"{scenario}: has events, which engine {BATCH!r} does not support")
-        if name == BATCH and run.experiment.coupling == "linear":
+        if name != FMU and run.events:
+            raise InputError(f"{scenario}: has events, which engine {name!r} does not support")
+        if name != FMU and run.experiment.coupling == "linear":
             raise InputError(
-                f"{scenario}: coupling linear goes back in time, which engine {BATCH!r} cannot; "
+                f"{scenario}: coupling linear goes back in time, which engine {name!r} cannot; "
                 f"use --engine {FMU}"
             )
 
@@ -359,11 +370,13 @@ def _engine(
     _check_engine(name, prepared)
     if name == FMU:
         return FmuEngine(prepared, means.loop, own)
-    engine = BatchEngine(_systems(prepared), own)
+    runners: Runners = Cards(_INSTEAD) if name == GPU else PROCESSOR
+    engine, is_here = BatchEngine(_systems(prepared), own, runners=runners), means.scheduler is None
     for scenario, run in prepared.items():
         experiment = run.experiment
         engine.prepare(
-            Point(0, scenario, {}, experiment.stop_time, experiment.step, experiment.order)
+            Point(0, scenario, {}, experiment.stop_time, experiment.step, experiment.order),
+            is_here or name == BATCH,
         )
     return engine
 
@@ -394,6 +407,9 @@ def _record(study: Study, ready: Ready, command: Sequence[str]) -> dict[str, Any
     stated = asdict(study)
     own = {file.name: file.digest for file in ready.own}
     own |= {function.name: function.digest for function in ready.engine.functions}
+    engine, cards = ready.engine, list[str]()
+    if isinstance(engine, BatchEngine) and ready.means.scheduler is None:
+        cards = [*engine.runners.names]
     return {
         "study": study.name,
         "title": study.title,
@@ -413,6 +429,7 @@ def _record(study: Study, ready: Ready, command: Sequence[str]) -> dict[str, Any
         "versions": {"python": sys.version.split()[0]}
         | {package: version(package) for package in _RECORDED},
         "platform": platform.platform(),
+        **({"cards": cards} if cards else {}),
     }
 
 
@@ -445,7 +462,7 @@ def making_runs(
 
         pool = cluster(scheduler, engine)
     elif isinstance(engine, BatchEngine):
-        pool = local_threads(workers, engine)
+        pool = local_threads(workers or engine.runners.threads, engine)
     else:
         pool = local_workers(workers, engine)
     with pool as started:
