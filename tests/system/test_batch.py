@@ -21,7 +21,6 @@ from orchestrator.commands.main import main
 from orchestrator.cosim import Order, PortName, System, write_ssp
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.program.library import Program
 from orchestrator.runs.preparation import Prepared, load, load_scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.columns import Case, Outcomes, Point, Points
@@ -338,18 +337,6 @@ def test_runs_as_columns_are_those_made_one_by_one():
     found = Outcomes.joined([*batch.outcomes(points)])
     assert [*found] == [*outcomes_of(batch, points)]
     assert [outcome.failure for outcome in found] == [None, *[REFUSED] * 4, None]
-
-
-def test_a_program_may_make_all_runs_of_a_block_at_once():
-    """As on a graphics card."""
-
-    class AtOnce(Program):
-        least_runs = most_runs = 1000
-
-    points = Points.of(Point(i, "fig4", {"plant.eta0.y": float(i)}, 0.1, 0.02) for i in range(40))
-    engine = BatchEngine(systems("fig4"), make=AtOnce)
-    [found] = engine.outcomes(points)
-    assert [*found] == [*outcomes_of(engines("fig4")[0], points)]
 
 
 def test_threads_have_noise_of_their_own():
