@@ -91,24 +91,19 @@ struct some_words {
 _MEMORY = """\
 enum {{ WORDS = sizeof(whole) / sizeof(uint64_t), GENERATORS = {generators} }};
 
-template <int SIZE> static __forceinline__ void copy_in(void *to, const uint64_t from[], size_t n,
-                                                        size_t i) {{
-    if (SIZE == sizeof(int)) {{
-        *(int *)to = (int)from[i];
-    }} else {{
-        UNROLLED
-        for (int w = 0; w < SIZE / 8; w++) ((uint64_t *)to)[w] = from[w * n + i];
-    }}
+/* Numbers of 8 bytes, and perhaps one of 4 at the end. */
+template <int SIZE>
+static __forceinline__ void copy_in(void *to, const uint64_t from[], size_t n, size_t i) {{
+    UNROLLED
+    for (int w = 0; w < SIZE / 8; w++) ((uint64_t *)to)[w] = from[w * n + i];
+    if (SIZE % 8) ((uint32_t *)to)[SIZE / 8 * 2] = (uint32_t)from[SIZE / 8 * n + i];
 }}
 
-template <int SIZE, int FIRST = 0>
+template <int SIZE>
 static __forceinline__ void copy_out(const void *from, uint64_t to[], size_t n, size_t i) {{
-    if (SIZE == sizeof(int)) {{
-        to[i] = (uint64_t) * (const uint32_t *)from;
-    }} else {{
-        UNROLLED
-        for (int w = FIRST / 8; w < SIZE / 8; w++) to[w * n + i] = ((const uint64_t *)from)[w];
-    }}
+    UNROLLED
+    for (int w = 0; w < SIZE / 8; w++) to[w * n + i] = ((const uint64_t *)from)[w];
+    if (SIZE % 8) to[SIZE / 8 * n + i] = ((const uint32_t *)from)[SIZE / 8 * 2];
 }}
 
 static __forceinline__ void fetch(simulation *it, const uint64_t memory[], size_t n, size_t i) {{
