@@ -70,20 +70,20 @@ static __forceinline__ void seed_copy(generator *noise, uint32_t seed) {
 
 #: Passages about generators, which have their words, and for a card, where neighbours share memory.
 _OWN = (
-    "typedef uint32_t *some_words;",
+    "typedef uint32_t *word_places;",
     "uint32_t words[GENERATOR_WORDS];",
     DRAWING,
     "seed_generator(&it->noise",
 )
 _SHARED = (
     """\
-struct some_words {
+struct word_places {
     uint32_t *first;
     size_t apart; /* words between two of a generator */
     uint32_t &operator[](size_t i) const { return first[i * apart]; }
-    some_words operator+(size_t i) const { return {first + i * apart, apart}; }
+    word_places operator+(size_t i) const { return {first + i * apart, apart}; }
 };""",
-    "some_words words;",
+    "word_places words;",
     _DRAWING,
     "seed_copy(&it->noise",
 )
