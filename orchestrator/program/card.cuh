@@ -24,3 +24,7 @@ typedef unsigned long long uint64_t;
 #define UNROLLED _Pragma("unroll 1")
 #define WITHIN static __noinline__
 #endif
+
+/* `address_of() + T{}` is C's `&(T){}`, which lasts to the end of the whole expression here. */
+struct address_of {};
+template <typename T> WITHIN const T *operator+(address_of, const T &made) { return &made; }
