@@ -29,8 +29,8 @@ _MOST_RUNS = 2**19
 #: Share of a card's free memory that runs may take.
 _SHARE = 0.8
 
-#: Words of a generator.
-_GENERATOR = 624
+#: Words of a generator, of 32 bits.
+GENERATOR = 624
 
 #: Bytes of a run besides its memory and its numbers: its times, its steps and whether it is refused.
 _REST = 64
@@ -148,6 +148,28 @@ def find_cards(instead: str) -> list[Card]:
     return [CudaCard(number) for number in range(n)]
 
 
+def find_card(name: str, instead: str) -> Card:
+    """Return the graphics card of a name: `cuda`, or `cuda:1` for the second one.
+
+    Args:
+        name: of the card.
+        instead: advice for a machine without one.
+
+    Raises:
+        InputError: there is none of this name, or its driver or CuPy is missing.
+
+    """
+    kind, _, digits = name.partition(":")
+    if kind != "cuda" or not (digits or "0").isdecimal():
+        raise InputError(f"device = {name!r}: use cpu, cuda or, for the second card, cuda:1")
+    cards, number = find_cards(instead), int(digits or "0")
+    if number >= len(cards):
+        raise InputError(
+            f"device = {name!r}: the last card of this machine is cuda:{len(cards) - 1}"
+        )
+    return cards[number]
+
+
 class CardProgram:
     """A program that cards run, each many runs at a time; threads may share it.
 
@@ -213,7 +235,7 @@ class _Compiled:
             self._rest("sizes")(1, found)
             self.words, self.generators = found.tolist()
             n_numbers = self.words + len(source.parameters) + source.n_indices
-            size = 8 * n_numbers + 4 * _GENERATOR * self.generators + _REST
+            size = 8 * n_numbers + 4 * GENERATOR * self.generators + _REST
             self.most_runs = max(1, min(_MOST_RUNS, int(_SHARE * card.free_memory() / size)))
 
     def runs(
@@ -227,7 +249,7 @@ class _Compiled:
             arrays: Any = card.arrays
             varied = np.array([i for i in range(values.shape[1]) if i not in same], np.int32)
             memory = arrays.empty((self.words, n), np.uint64)
-            words = arrays.empty(_GENERATOR * self.generators * n, np.uint32)
+            words = arrays.empty(GENERATOR * self.generators * n, np.uint32)
             refused = arrays.empty(n, np.int32)
             found = arrays.empty((source.n_indices, n))
             start_times, steps, stop_times, full_steps, all_steps = map(arrays.asarray, grids)
