@@ -29,7 +29,8 @@ from fmus.kinds import NATIVE
 from orchestrator.runs.preparation import load_scenario, prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
-from orchestrator.studies.engine import Engine, FmuEngine, Point
+from orchestrator.studies.columns import Point
+from orchestrator.studies.engine import Engine, FmuEngine, outcomes_of
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study, ready_studies
 
@@ -56,8 +57,7 @@ def processor(function: Callable[[], object]) -> float:
 
 def make(engine: Engine, points: Iterable[Point]) -> None:
     """Make runs and forget them."""
-    for point in points:
-        deque(engine.outcomes([point]), maxlen=0)
+    deque(outcomes_of(engine, points), maxlen=0)
 
 
 def compare(both: Sequence[Engine], steps: int, repetitions: int) -> None:
@@ -97,7 +97,9 @@ def check(n: int) -> None:
         points = [space[number] for number in Random(name).sample(range(len(space)), n)]
         same = sum(
             bool(expected.failure) if outcome.failure == REFUSED else outcome == expected
-            for outcome, expected in zip(batch.outcomes(points), fmus.outcomes(points), strict=True)
+            for outcome, expected in zip(
+                *(outcomes_of(engine, points) for engine in (batch, fmus)), strict=True
+            )
         )
         print(f"{name:12} {same} of {n} runs are the same", flush=True)
 

@@ -28,7 +28,8 @@ from measuring import options, python, timed
 from auv_fmu.paper.euler import STEP
 from orchestrator.runs.preparation import load
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Point
+from orchestrator.studies.columns import Point
+from orchestrator.studies.engine import outcomes_of
 
 SOURCE = Path(__file__).with_suffix(".c")
 
@@ -93,7 +94,7 @@ def batch() -> Callable[[int], object]:
 
     def make(steps: int) -> None:
         point = Point(0, "fig4", {"plant.noise.std": 0.0}, steps * STEP, STEP)
-        deque(engine.outcomes([point]), maxlen=0)
+        deque(outcomes_of(engine, [point]), maxlen=0)
 
     return make
 

@@ -23,7 +23,8 @@ from fmus.kinds import NATIVE
 from orchestrator.runs.preparation import load_scenario, prepare
 from orchestrator.runs.request import Request
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Point
+from orchestrator.studies.columns import Point
+from orchestrator.studies.engine import outcomes_of
 
 #: Numbers of simulations at once, and the end of their run [s].
 _MANY = (1, 100, 1_000, 10_000)
@@ -77,7 +78,7 @@ def many(n: int, repetitions: int) -> None:
 
     def batch() -> None:
         def make(count: int) -> None:
-            for _ in engine.outcomes([point] * count):
+            for _ in outcomes_of(engine, [point] * count):
                 pass
 
         with ThreadPoolExecutor(threads) as pool:

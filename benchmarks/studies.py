@@ -13,22 +13,22 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import islice
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain, islice
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
 from time import perf_counter, process_time
 from typing import NamedTuple
-from unittest.mock import patch
 
+import numpy as np
 from measuring import python
 
 from orchestrator.runs.preparation import Prepared, load_scenario, prepare
 from orchestrator.runs.request import Request
-from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
+from orchestrator.studies.columns import Numbers, Outcomes, Points, Texts
+from orchestrator.studies.engine import Engine, FmuEngine
 from orchestrator.studies.space import Space
 from orchestrator.studies.store import open_store
 from orchestrator.studies.study import study_of
@@ -45,30 +45,41 @@ _WARM = 3
 _TRIED = 5
 
 
+def plain(numbers: np.ndarray, values: np.ndarray, *columns: str) -> Outcomes:
+    """Outcomes of runs that succeed."""
+    none = Texts(np.zeros(len(numbers), dtype=np.int32))
+    return Outcomes(numbers, columns, values, none, none)
+
+
 class Timed(NamedTuple):
     """An engine whose only result is the processor time of each run."""
 
     engine: Engine
+    least_runs: int = 1
+    most_runs: int = 10_000
     digest: str = "timed"
 
-    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
-        """Make runs, one after the other."""
-        outcomes = self.engine.outcomes(points)
-        for point in points:
+    def outcomes(self, points: Points) -> Iterator[Outcomes]:
+        """Make runs, as the engine makes them; each of some at a time gets the same share."""
+        start = process_time()
+        for made in self.engine.outcomes(points):
+            seconds = (process_time() - start) / len(made)
+            yield plain(made.numbers, np.full((len(made), 1), seconds), "seconds")
             start = process_time()
-            next(outcomes)
-            yield Outcome(point.number, {"seconds": process_time() - start})
 
 
 class Idle(NamedTuple):
     """An engine whose runs take no time."""
 
+    least_runs: int = 1
+    most_runs: int = 10_000
     digest: str = "idle"
 
-    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
-        """Return nothing."""
-        for point in points:
-            yield Outcome(point.number, dict.fromkeys(index_columns(), 0.1 * point.number))
+    def outcomes(self, points: Points) -> Iterator[Outcomes]:
+        """Return numbers of no meaning."""
+        columns = index_columns()
+        values = 0.1 * points.numbers[:, np.newaxis] + np.zeros(len(columns))
+        yield plain(points.numbers, values, *columns)
 
 
 class Cost(NamedTuple):
@@ -78,14 +89,19 @@ class Cost(NamedTuple):
     wall: float
 
 
-def cost(engine: Engine, points: Iterable[Point], workers: int) -> Cost:
+def cost(engine: Engine, points: Iterable[Points], workers: int) -> Cost:
     """Time of runs that several processes make."""
-    with making_runs(Timed(engine), iter(points), workers=workers) as blocks:
+    with making_runs(Timed(engine), points, workers=workers) as blocks:
         for _ in islice(blocks, _WARM * workers):
             pass
         start = perf_counter()
-        seconds = [outcome.indices["seconds"] for block in blocks for outcome in block]
+        seconds = [*chain(*(block.indices[:, 0].tolist() for block in blocks))]
         return Cost(median(seconds), (perf_counter() - start) / len(seconds))
+
+
+def first(space: Space, n: int, size: int = Idle().most_runs) -> Iterator[Points]:
+    """The first runs, some at a time."""
+    return map(space.points, Numbers((0, n)).blocks(size))
 
 
 def prepared(kind: str) -> Prepared:
@@ -110,7 +126,7 @@ def keeping(n: int) -> tuple[float, float, float]:
         open_store(Path(folder), {"made_of": {}}, space.indices) as unfinished,
     ):
         assert unfinished is not None
-        with making_runs(Idle(), (space[i] for i in range(n)), workers=1) as blocks:
+        with making_runs(Idle(), first(space, n), workers=1) as blocks:
             for outcomes in blocks:
                 unfinished.add(outcomes)
         database = sum(file.stat().st_size for file in Path(folder).glob("unfinished*"))
@@ -122,10 +138,7 @@ def keeping(n: int) -> tuple[float, float, float]:
 def block(n: int) -> float:
     """Seconds of an empty block, from sending to its result."""
     space = starts(n, 1.0)
-    with (
-        patch.object(blocks_module, "_MOST_RUNS", 1),
-        making_runs(Idle(), (space[i] for i in range(n)), workers=1) as blocks,
-    ):
+    with making_runs(Idle(most_runs=1), first(space, n), workers=1) as blocks:
         start = perf_counter()
         made = sum(1 for _ in blocks)
         return (perf_counter() - start) / made
@@ -151,11 +164,11 @@ def main() -> None:
     for name, make in engines.items():
         engine = make()
         space = starts(1_000_000, options.stop_time)
-        tried = Timed(engine).outcomes([space[i] for i in range(_TRIED)])
-        once = min(outcome.indices["seconds"] for outcome in tried)
+        tried = Timed(engine).outcomes(space.points(np.arange(_TRIED)))
+        once = min(float(outcomes.indices.min()) for outcomes in tried)
         n = 2 * _WARM + round(options.seconds / once)
         pairs = [
-            [cost(engine, islice(space, n), workers) for workers in (1, 2)]
+            [cost(engine, first(space, n), workers) for workers in (1, 2)]
             for _ in range(options.repetitions)
         ]
         alone, paired = (min(pair[i].processor for pair in pairs) for i in (0, 1))

@@ -54,7 +54,8 @@ from orchestrator.runs.preparation import load_scenario, prepare_request, with_c
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Point
+from orchestrator.studies.columns import Point
+from orchestrator.studies.engine import outcomes_of
 from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study import read_study
 from orchestrator.vehicle.indices import SMALLEST_DISTANCE_LABEL, smallest_distances
@@ -115,7 +116,7 @@ class Runs:
     ) -> dict[str, np.ndarray]:
         """The indices of several runs."""
         points = (self.point(name, values, step, stop_time) for values in draws)
-        found = [outcome.indices for outcome in self._engine.outcomes(points)]
+        found = [outcome.indices for outcome in outcomes_of(self._engine, points)]
         return {key: np.array([indices[key] for indices in found]) for key in found[0]}
 
     def variation_ratio(self, name: str, until: float, values: Values, step: float = STEP) -> Any:

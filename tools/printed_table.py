@@ -33,7 +33,7 @@ from orchestrator.paper.claims import (
 from orchestrator.paper.page import numbers, table
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.engine import Point
+from orchestrator.studies.columns import Point
 from orchestrator.vehicle.index.final_error import LAST
 from orchestrator.vehicle.index.tracking import REACHED
 from orchestrator.vehicle.signals import ACTUATORS, AXES, STANDARD, applied

@@ -6,25 +6,20 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from importlib import import_module
 from importlib.util import find_spec
+from itertools import compress
 from math import nan
 from queue import SimpleQueue
 from threading import Lock
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.program.cuda import OPTIONS, in_cuda
-from orchestrator.program.library import Source
-
-if TYPE_CHECKING:
-    from orchestrator.program.library import Grids
+from orchestrator.program.library import Grids, Source
 
 #: Threads of a block: with 255 registers each, two blocks fill a multiprocessor.
 _THREADS = 128
-
-#: Most runs at a time: more do not make a card quicker.
-_MOST_RUNS = 2**19
 
 #: Share of a card's free memory that runs may take.
 _SHARE = 0.8
@@ -32,7 +27,7 @@ _SHARE = 0.8
 #: Words of a generator, of 32 bits.
 GENERATOR = 624
 
-#: Bytes of a run besides its memory and its numbers: its times, its steps and whether it is refused.
+#: Bytes of a run besides its memory and its numbers: times, steps, and whether it is refused.
 _REST = 64
 
 #: Runs a kernel with a number of threads and its arguments.
@@ -138,14 +133,68 @@ def find_cards(instead: str) -> list[Card]:
     """
     if find_spec("cupy") is None:
         raise InputError(f"a graphics card needs CuPy: pip install 'auv-fmu[gpu]'; {instead}")
-    cupy: Any = import_module("cupy")
     try:
-        n = cupy.cuda.runtime.getDeviceCount()
-    except cupy.cuda.runtime.CUDARuntimeError as error:
+        cupy: Any = import_module("cupy")
+        return [CudaCard(number) for number in range(cupy.cuda.runtime.getDeviceCount())]
+    # CuPy without a driver, or for another version of CUDA, raises errors of its own.
+    except Exception as error:
         raise InputError(
             f"no graphics card of NVIDIA can be used: {reason(error)}; {instead}"
         ) from error
-    return [CudaCard(number) for number in range(n)]
+
+
+class Cards:
+    """The graphics cards of this machine, or of a worker that it is sent to."""
+
+    least_runs, most_runs = 2**15, 2**19
+
+    def __init__(self, instead: str, cards: Sequence[Card] = ()) -> None:
+        """Take some cards; by default, those of the machine when they are needed.
+
+        Args:
+            instead: advice for a machine without one.
+            cards: to use.
+
+        """
+        self._instead, self._cards = instead, [*cards]
+
+    @property
+    def cards(self) -> Sequence[Card]:
+        """The cards.
+
+        Raises:
+            InputError: there is none.
+
+        """
+        self._cards = self._cards or find_cards(self._instead)
+        return self._cards
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names of the cards."""
+        return [card.name for card in self.cards]
+
+    @property
+    def threads(self) -> int:
+        """Number of blocks to make at a time: while a card makes one, the next is prepared."""
+        return 2 * len(self.cards)
+
+    def __call__(self, source: Source) -> CardProgram:
+        """Return a program on these cards.
+
+        Raises:
+            InputError: there is none, or it cannot compile the program.
+
+        """
+        return CardProgram(source, self.cards)
+
+    def portable(self, source: Source) -> Source:
+        """Return a source for another machine."""
+        return source
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state without cards, which stay where they are."""
+        return {"_instead": self._instead, "_cards": []}
 
 
 def find_card(name: str, instead: str) -> Card:
@@ -164,26 +213,20 @@ def find_card(name: str, instead: str) -> Card:
         raise InputError(f"device = {name!r}: use cpu, cuda or, for the second card, cuda:1")
     cards, number = find_cards(instead), int(digits or "0")
     if number >= len(cards):
-        raise InputError(
-            f"device = {name!r}: the last card of this machine is cuda:{len(cards) - 1}"
-        )
+        raise InputError(f"device = {name!r}: this machine has {len(cards)} cards")
     return cards[number]
 
 
 class CardProgram:
-    """A program that cards run, each many runs at a time; threads may share it.
+    """A program that cards run, many runs at a time on each; several threads may make runs.
 
     Attributes:
         source: its source.
-        least_runs: number of runs that take about as long as a single one.
-        most_runs: largest number of runs at a time.
 
     """
 
-    least_runs: ClassVar[int] = 2**15
-
     def __init__(self, source: Source, cards: Sequence[Card]) -> None:
-        """Compile what begins runs; the rest is compiled for the first runs.
+        """Compile what begins runs and gives their results; steps are compiled with the first runs.
 
         Args:
             source: of the program.
@@ -195,14 +238,12 @@ class CardProgram:
         """
         self.source, self._lock = source, Lock()
         self._same: dict[int, float] | None = None
-        self._on = [_Compiled(source, card) for card in cards]
-        self._free: SimpleQueue[_Compiled] = SimpleQueue()
-        for each in self._on:
-            self._free.put(each)
-        self.most_runs = min(each.most_runs for each in self._on)
+        self._free: SimpleQueue[_OnCard] = SimpleQueue()
+        for card in cards:
+            self._free.put(_OnCard(source, card))
 
     def runs(self, values: np.ndarray, grids: Grids) -> tuple[np.ndarray, np.ndarray]:
-        """Make some runs, as :meth:`.Program.runs` does."""
+        """Make some runs, as :meth:`.Program.runs` does, on the next card that is free."""
         same = self._same_in(values)
         card = self._free.get()
         try:
@@ -211,19 +252,17 @@ class CardProgram:
             self._free.put(card)
 
     def _same_in(self, values: np.ndarray) -> Mapping[int, float]:
-        """Return the parameters that have been the same in all runs so far."""
+        """Return the parameters, by their places, that have been the same in all runs so far."""
         with self._lock:
-            if self._same is None:
-                self._same = dict(enumerate(values[0].tolist()))
-            is_same = (values == [self._same.get(i, nan) for i in range(values.shape[1])]).all(
-                axis=0
-            )
-            if not is_same[[*self._same]].all():
-                self._same = {i: value for i, value in self._same.items() if is_same[i]}
+            before = dict(enumerate(values[0].tolist())) if self._same is None else self._same
+            places = [*before]
+            is_same = (values[:, places] == [*before.values()]).all(axis=0)
+            if self._same is None or not is_same.all():
+                self._same = {place: before[place] for place in compress(places, is_same)}
             return self._same
 
 
-class _Compiled:
+class _OnCard:
     """A program on one card."""
 
     def __init__(self, source: Source, card: Card) -> None:
@@ -231,36 +270,47 @@ class _Compiled:
         self._same: Mapping[int, float] | None = None
         with card:
             self._rest = card.kernels(in_cuda(source).rest)
-            found = card.arrays.empty(2, np.int32)
-            self._rest("sizes")(1, found)
-            self.words, self.generators = found.tolist()
-            n_numbers = self.words + len(source.parameters) + source.n_indices
-            size = 8 * n_numbers + 4 * GENERATOR * self.generators + _REST
-            self.most_runs = max(1, min(_MOST_RUNS, int(_SHARE * card.free_memory() / size)))
+            sizes = card.arrays.empty(2, np.int32)
+            self._rest("sizes")(1, sizes)
+            self._words, self._generators = sizes.tolist()
 
     def runs(
         self, values: np.ndarray, grids: Grids, same: Mapping[int, float]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Make some runs, of which some parameters are the same in all."""
-        n, source = len(values), self._source
-        with self._card as card:
+        """Make runs, as many at a time as its memory holds; some parameters are the same in all."""
+        n_numbers = self._words + values.shape[1] + self._source.n_indices
+        size = 8 * n_numbers + 4 * GENERATOR * self._generators + _REST
+        with self._card:
             if self._same is not same:
-                self._steps, self._same = card.kernels(in_cuda(source, same).steps), same
-            arrays: Any = card.arrays
-            varied = np.array([i for i in range(values.shape[1]) if i not in same], np.int32)
-            memory = arrays.empty((self.words, n), np.uint64)
-            words = arrays.empty(GENERATOR * self.generators * n, np.uint32)
-            refused = arrays.empty(n, np.int32)
-            found = arrays.empty((source.n_indices, n))
-            start_times, steps, stop_times, full_steps, all_steps = map(arrays.asarray, grids)
-            self._rest("begin_all")(
-                n, memory, words, arrays.asarray(values[0]), np.int32(len(varied)),
-                arrays.asarray(varied), arrays.asarray(np.ascontiguousarray(values[:, varied].T)),
-                start_times, steps, stop_times, full_steps, all_steps, refused,
-            )  # fmt: skip
-            self._steps("advance")(n, memory, words, all_steps, refused)
+                self._steps = self._card.kernels(in_cuda(self._source, same).steps)
+                self._same = same
+            n = max(1, int(_SHARE * self._card.free_memory()) // size)
+            parts = [slice(first, first + n) for first in range(0, len(values), n)]
+            made = [
+                self._made(values[part], Grids(*(column[part] for column in grids)))
+                for part in parts
+            ]
+        indices, refused = map(np.concatenate, zip(*made, strict=True))
+        return indices, refused
+
+    def _made(self, values: np.ndarray, grids: Grids) -> tuple[np.ndarray, np.ndarray]:
+        n, arrays = len(values), self._card.arrays
+        assert self._same is not None
+        varied = np.array([i for i in range(values.shape[1]) if i not in self._same], np.int32)
+        start_times, steps, stop_times, full_steps, all_steps = map(arrays.asarray, grids)
+        memory = arrays.empty((self._words, n), np.uint64)
+        words = arrays.empty(GENERATOR * self._generators * n, np.uint32)
+        refused = arrays.empty(n, np.int32)
+        found = arrays.empty((self._source.n_indices, n))
+        self._rest("begin_all")(
+            n, memory, words, arrays.asarray(values[0]), np.int32(len(varied)),
+            arrays.asarray(varied), arrays.asarray(np.ascontiguousarray(values[:, varied].T)),
+            start_times, steps, stop_times, full_steps, all_steps, refused,
+        )  # fmt: skip
+        self._steps("advance")(n, memory, words, all_steps, refused)
+        if self._source.n_indices:
             self._rest("give")(n, memory, found, refused)
-            is_refused = card.to_numpy(refused).astype(bool)
-            indices = card.to_numpy(arrays.ascontiguousarray(found.T))
+        is_refused = self._card.to_numpy(refused).astype(bool)
+        indices = self._card.to_numpy(arrays.ascontiguousarray(found.T))
         indices[is_refused] = nan
         return indices, is_refused

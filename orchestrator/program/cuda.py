@@ -2,8 +2,8 @@
 
 A card has no headers and a compiler of C++, and it is quick only with values in registers. So each
 part of a simulation is a variable of its own in a thread, to which the simulation refers, and
-parameters that are the same in all runs are constants. Operations are not contracted, as in C; sine,
-tanh and the like are CUDA's.
+parameters that are the same in all runs are constants. Operations are not contracted, as in C;
+sine, tanh and the like are CUDA's.
 """
 
 from __future__ import annotations
@@ -63,7 +63,9 @@ static __forceinline__ void draw_normals(generator *noise, double (&draws)[N], i
     for (int i = 0; i < N; i++) draws[i] = drawn[i];
 }
 
-static __noinline__ void seed_apart(generator *noise, uint32_t seed) { seed_generator(noise, seed); }
+static __noinline__ void seed_apart(generator *noise, uint32_t seed) {
+    seed_generator(noise, seed);
+}
 
 static __forceinline__ void seed_copy(generator *noise, uint32_t seed) {
     generator copy = *noise;
@@ -206,7 +208,7 @@ def _source(source: Source, text: str, same: Mapping[int, float], is_hot: bool) 
         run = "; ".join(
             [
                 *(f"{each.type} its_{each.name} = {{}}" for each in parts),
-                f"simulation name = {{{', '.join(f'.{each.name} = its_{each.name}' for each in parts)}}}",
+                f"simulation name = {{{', '.join(map('.{0.name} = its_{0.name}'.format, parts))}}}",
             ]
         )
     else:

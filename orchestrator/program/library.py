@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from ctypes import CDLL, c_double, c_int, c_size_t, c_void_p, create_string_buffer
 from dataclasses import dataclass, field, replace
 from functools import partial
 from threading import local
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from fmpy import platform_tuple
@@ -95,6 +96,36 @@ class Source:
         return library_key(self.text, *FLAGS, machine=self.machine)
 
 
+class Grids(NamedTuple):
+    """Times and steps of some runs, as columns.
+
+    Attributes:
+        start_time, step, stop_time: of the experiments, as float64 [s].
+        full_steps, steps: numbers of steps of full length, and of all steps, as int32.
+
+    """
+
+    start_time: np.ndarray
+    step: np.ndarray
+    stop_time: np.ndarray
+    full_steps: np.ndarray
+    steps: np.ndarray
+
+    @classmethod
+    def of(cls, experiments: Iterable[Experiment]) -> Grids:
+        """Return the times and steps of experiments."""
+        *times, full_steps, steps = zip(*map(_grid, experiments), strict=True)
+        return cls(*map(np.array, times), *(np.array(n, np.int32) for n in (full_steps, steps)))
+
+    def rows(self, places: np.ndarray) -> Grids:
+        """Return those at some places."""
+        return Grids(*(column[places] for column in self))
+
+
+def _grid(run: Experiment) -> tuple[float, float, float, int, int]:
+    return run.start_time, run.step, run.stop_time, run.full_steps, run.rows - 1
+
+
 class Program:
     """A compiled program; several threads may make runs at the same time.
 
@@ -134,19 +165,118 @@ class Program:
             Its indices, NaN for missing ones; None: a component has refused a value.
 
         """
-        memory, library = self._memory.of_size(self.size), self.library
-        steps = experiment.rows - 1
-        if library.begin(
-            memory, values.ctypes.data, experiment.start_time, experiment.step,
-            experiment.stop_time, experiment.full_steps, steps,
-        ):  # fmt: skip
-            return None
-        if library.run(memory, steps, None if rows is None else rows.ctypes.data):
-            return None
         indices = np.empty(self.source.n_indices)
-        if len(indices) and library.indices(memory, indices.ctypes.data):
-            return None
-        return indices
+        address = indices.ctypes.data
+        is_refused = self._refuses(values.ctypes.data, _grid(experiment), rows, address)
+        return None if is_refused else indices
+
+    def runs(self, values: np.ndarray, grids: Grids) -> tuple[np.ndarray, np.ndarray]:
+        """Make some runs, at most `most_runs`.
+
+        Args:
+            values: values of the parameters, (runs, parameters), which are not changed.
+            grids: times and steps.
+
+        Returns:
+            The indices, (runs, indices), and a mask of the runs that a component has refused. The
+            indices of these, and missing ones, are NaN.
+
+        """
+        values = np.ascontiguousarray(values)
+        indices = np.empty((len(values), self.source.n_indices))
+        refused = np.zeros(len(values), dtype=bool)
+        for i, grid in enumerate(zip(*(column.tolist() for column in grids), strict=True)):
+            refused[i] = self._refuses(
+                values.ctypes.data + i * values.strides[0],
+                grid,
+                None,
+                indices.ctypes.data + i * indices.strides[0],
+            )
+        indices[refused] = np.nan
+        return indices, refused
+
+    def _refuses(
+        self,
+        values: int,
+        grid: tuple[float, float, float, int, int],
+        rows: np.ndarray | None,
+        indices: int,
+    ) -> bool:
+        """Make a run, from and into memory; return True if a component has refused a value."""
+        memory, library = self._memory.of_size(self.size), self.library
+        return bool(
+            library.begin(memory, values, *grid)
+            or library.run(memory, grid[-1], None if rows is None else rows.ctypes.data)
+            or (self.source.n_indices and library.indices(memory, indices))
+        )
+
+
+class Runner(Protocol):
+    """A program that makes runs."""
+
+    def runs(self, values: np.ndarray, grids: Grids) -> tuple[np.ndarray, np.ndarray]:
+        """Make some runs, as :meth:`Program.runs` does."""
+        ...
+
+
+class Runners(Protocol):
+    """What programs run on: the processor, or cards.
+
+    Attributes:
+        least_runs: number of runs that take about as long as a single one.
+        most_runs: largest number of runs at a time.
+
+    """
+
+    least_runs: int
+    most_runs: int
+
+    @property
+    def names(self) -> Sequence[str]:
+        """Names for the record of a study."""
+        ...
+
+    @property
+    def threads(self) -> int | None:
+        """Number of blocks to make at a time; None: one for each core."""
+        ...
+
+    def __call__(self, source: Source) -> Runner:
+        """Return a program.
+
+        Raises:
+            InputError: it cannot be compiled.
+
+        """
+        ...
+
+    def portable(self, source: Source) -> Source:
+        """Return a source for another machine."""
+        ...
+
+
+class Processor:
+    """The processor, which makes one run after the other."""
+
+    least_runs, most_runs = 1, 10_000
+    names: Sequence[str] = ()
+    threads: int | None = None
+
+    def __call__(self, source: Source) -> Program:
+        """Return a compiled program.
+
+        Raises:
+            InputError: it cannot be compiled; the message says what to install.
+
+        """
+        return Program(source)
+
+    def portable(self, source: Source) -> Source:
+        """Return a source with the library that this machine has compiled."""
+        return self(source).source.with_library()
+
+
+PROCESSOR = Processor()
 
 
 class _ThreadMemory(local):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, lru_cache
-from itertools import chain
-from math import isnan
+from functools import cache, cached_property, partial
+from itertools import chain, compress
+from math import ceil
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,19 +27,28 @@ from orchestrator.cosim import (
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.program.components import definitions_of
-from orchestrator.program.library import Program, Source
+from orchestrator.program.library import (
+    PROCESSOR,
+    Grids,
+    Program,
+    Runner,
+    Runners,
+    Source,
+)
 from orchestrator.program.writer import Text, indices_of
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import PROGRAM
 from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import Scenario
-from orchestrator.studies.engine import Outcome, Point, kinds_of, with_functions
+from orchestrator.studies.columns import Case, Outcomes, Point, Points, Texts
+from orchestrator.studies.engine import with_functions
 from orchestrator.studies.own_functions import OwnFunction
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import (
+    OBSERVER,
+    RULES,
     WATCHED,
     cautions,
-    cautions_of,
     values_of,
 )
 from orchestrator.vehicle.indices import INDICES, SMALLEST_DISTANCE, prefixed
@@ -51,6 +60,12 @@ _ADVICE = "use --engine fmu"
 #: Failure of a run that the program has refused; it is repeated with FMUs, which give a reason.
 REFUSED = "refused"
 
+#: Number of parts in which a block is made, so that it can be stopped between them.
+_PARTS = 16
+
+#: Types of columns by the types of ports whose values are only checked for their range.
+_NUMBERS = {"Real": "f", "Integer": "i"}
+
 #: Key of the programs of a system: the order, and the decimations of the components.
 _Key = tuple[Order | None, tuple[int, ...]]
 
@@ -61,38 +76,33 @@ class _Compiled:
 
     Attributes:
         source: of the program.
-        groups: for each index, the places of its columns.
-        watched: for each loop, the places of the values that cautions depend on.
+        runners: make its runs.
+        places: of the columns of indices.
+        watched: kinds of cautions, and the places and limits of the values that they depend on.
 
     """
 
     source: Source
-    groups: Sequence[Mapping[str, int]]
-    watched: Sequence[Mapping[str, int]]
+    runners: Runners
+    places: Mapping[str, int]
+    watched: Sequence[tuple[str, int, float]]
 
     @cached_property
-    def program(self) -> Program:
+    def program(self) -> Runner:
         """The program, compiled."""
-        return Program(self.source)
+        return self.runners(self.source)
 
-    @cached_property
-    def _places(self) -> Mapping[str, int]:
-        return {column: place for group in self.groups for column, place in group.items()}
-
-    def indices(self, numbers: Sequence[float]) -> dict[str, float]:
-        """Return the indices in the results of a run, without groups of nan."""
-        indices = {column: numbers[place] for column, place in self._places.items()}
-        if any(map(isnan, indices.values())):
-            for group in self.groups:
-                if all(isnan(numbers[place]) for place in group.values()):
-                    for column in group:
-                        del indices[column]
-        return indices
+    @property
+    def on_processor(self) -> Program:
+        """The program, which makes runs with rows."""
+        program = self.program
+        assert isinstance(program, Program)
+        return program
 
     def __getstate__(self) -> Mapping[str, Any]:
         """Return the state without the loaded library; each process loads it."""
         state = {name: value for name, value in self.__dict__.items() if name != "program"}
-        return {**state, "source": self.program.source.with_library()}
+        return {**state, "source": self.runners.portable(self.source)}
 
 
 class _Parameter(NamedTuple):
@@ -101,6 +111,38 @@ class _Parameter(NamedTuple):
     place: int
     port: Port
     items: Mapping[str, int]
+
+    def number(self, value: Any) -> float:
+        """Return a value as a number.
+
+        Raises:
+            Refusal: the component would refuse it.
+
+        """
+        given: Any = self.items.get(value, value) if isinstance(value, str) else value
+        return float(self.port.checked(given))
+
+    def column(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return values as numbers, and a mask of those that the component would refuse."""
+        numbers, refused = np.zeros(len(values)), np.zeros(len(values), dtype=bool)
+        others = ~refused
+        if values.dtype.kind == _NUMBERS.get(self.port.type) and not self.port.choices:
+            numbers = values.astype(float)
+            low, high = self.port.minimum, self.port.maximum
+            others = ~np.isfinite(numbers)
+            others |= False if low is None else ~(numbers >= low)
+            others |= False if high is None else ~(numbers <= high)
+            others |= self.port.type == "Integer" and values != values.astype(np.int32)
+        distinct, codes = np.unique(values[others], return_inverse=True)
+        found = np.zeros(len(distinct))
+        for place, value in enumerate(distinct.tolist()):
+            try:
+                found[place] = self.number(value)
+            except Refusal:
+                found[place] = np.nan
+        numbers[others] = found[codes]
+        refused[others] = np.isnan(found)[codes]
+        return numbers, refused
 
 
 class _Programs:
@@ -112,11 +154,10 @@ class _Programs:
 
     """
 
-    def __init__(self, system: System, own: Sequence[OwnIndex]) -> None:
+    def __init__(self, system: System, own: Sequence[OwnIndex], runners: Runners) -> None:
         self.system, self.loops = system, loops_of(system)
-        self._own = own
+        self._own, self._runners = own, runners
         self._by_key: dict[_Key, _Compiled] = {}
-        self._by_step: dict[tuple[Order | None, float], _Compiled] = {}
         self._definitions: Mapping[str, Definition] | None = definitions_of(system)
         self._parameters: tuple[Mapping[str, _Parameter], np.ndarray] | None = None
         self._names = frozenset(
@@ -132,14 +173,12 @@ class _Programs:
             InputError: there is none.
 
         """
-        if (order, step) not in self._by_step:
-            key = order, tuple(self.system.decimations(step).values())
-            if key not in self._by_key:
-                self._by_key[key] = self._make(order, step)
-            self._by_step[order, step] = self._by_key[key]
-        return self._by_step[order, step]
+        key = order, tuple(self.system.decimations(step).values())
+        if key not in self._by_key:
+            self._by_key[key] = self._compiled(order, step)
+        return self._by_key[key]
 
-    def _make(self, order: Order | None, step: float) -> _Compiled:
+    def _compiled(self, order: Order | None, step: float) -> _Compiled:
         system = self.system
         if self._definitions is None:
             self._definitions = definitions_of(system)
@@ -148,55 +187,68 @@ class _Programs:
         plan = make_plan(system, Experiment(step * 2.0**20, step, order))
         looking = [[*indices_of(system, loop, reducers)] for loop in self.loops]
         text = Text(plan, self._definitions, [*chain(*looking)], self.loops, is_quick=True)
-        groups, watched, first = [], [], 0
+        columns: dict[str, int] = {}
+        watched, first = [], 0
         for (_, prefix), looks in zip(prefixed(self.loops), looking, strict=True):
             places: dict[str, int] = {}
             for look in looks:
                 for name, ports in look.reducer.results.items():
                     places[name] = first
                     first += len(ports)
-            groups += [
-                {f"{prefix}{name}": places[index.name] + i for i, name in enumerate(index.columns)}
+            columns |= {
+                f"{prefix}{name}": places[index.name] + i
                 for index in indices
                 if index.name in places
+                for i, name in enumerate(index.columns)
+            }
+            watched += [
+                (rule.kind, places[rule.number], rule.above)
+                for rule in RULES
+                if rule.number in places
             ]
-            names = (name for reducer in WATCHED for name in reducer.results)
-            watched.append({name: places[name] for name in names if name in places})
         if text.positions:
-            groups.append({SMALLEST_DISTANCE: first})
-        return _Compiled(Source.of(text), groups, watched)
+            columns[SMALLEST_DISTANCE] = first
+        return _Compiled(Source.of(text), self._runners, columns, watched)
 
-    def plain(self, point: Point) -> Point:
-        """Return a run whose parameters are single ones: without wildcards and groups."""
-        if self._names.issuperset(point.parameters):
-            return point
-        expanded = self.system.expanded(point.parameters)
-        parameters = {str(self.system.named(name)): value for name, value in expanded.items()}
-        return point._replace(parameters=parameters)
+    def plain(self, parameters: Mapping[str, Value]) -> Mapping[str, Value]:
+        """Return parameters as single ones: without wildcards and groups."""
+        if self._names.issuperset(parameters):
+            return parameters
+        expanded: Mapping[PortName, Any] = self.system.expanded(parameters)
+        return {str(self.system.named(name)): value for name, value in expanded.items()}
 
-    def values(self, compiled: _Compiled, changed: Mapping[str, Value]) -> np.ndarray:
-        """Return the values of all parameters of a run.
+    def name(self, varied: str) -> str:
+        """Return the name of a single parameter in the system."""
+        return varied if varied in self._names else str(self.system.named(PortName.read(varied)))
+
+    def values(
+        self, compiled: _Compiled, case: Case, points: Points
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the values of all parameters, (runs, parameters), and a mask of refused runs.
 
         Raises:
-            Refusal: a component would refuse one.
+            Refusal: a component would refuse a value that all runs have.
 
         """
         if self._parameters is None:
             # In one assignment, since other threads make runs.
             self._parameters = self._defaults(compiled)
         parameters, defaults = self._parameters
-        values = defaults.copy()
-        for name, value in changed.items():
-            parameter = parameters[name]
-            values[parameter.place] = _number(parameter, value)
-        return values
+        values, refused = np.tile(defaults, (len(points), 1)), np.zeros(len(points), dtype=bool)
+        for name, value in self.plain(case.parameters).items():
+            values[:, parameters[name].place] = parameters[name].number(value)
+        for name in case.varied:
+            parameter = parameters[self.name(name)]
+            values[:, parameter.place], others = parameter.column(points.values[name])
+            refused |= others
+        return values, refused
 
     def _defaults(self, compiled: _Compiled) -> tuple[Mapping[str, _Parameter], np.ndarray]:
         """Return all parameters of a program by name, and their values in the system."""
         names = compiled.source.parameters
         parameters = {name: self._parameter(place, name) for place, name in enumerate(names)}
         values = [
-            _number(parameter, self.system.value(PortName.read(name)))
+            parameter.number(self.system.value(PortName.read(name)))
             for name, parameter in parameters.items()
         ]
         return parameters, np.array(values, dtype=float)
@@ -223,7 +275,7 @@ class _Programs:
         self, compiled: _Compiled, point: Point, experiment: Experiment, rows: np.ndarray
     ) -> Result:
         """Return the result of a run, as :func:`.simulate` does."""
-        system = self.system.with_parameters(point.parameters)
+        system = self.system.with_parameters(self.plain(point.parameters))
         plan = make_plan(system, experiment)
         columns = [system.named(PortName.read(name)) for name in compiled.source.columns]
         # The order of systems of the language where none is stated.
@@ -234,22 +286,78 @@ class _Programs:
         result.hold(header, rows, Ending())
         return result
 
-    def cautions(self, compiled: _Compiled, point: Point, numbers: Sequence[float]) -> str | None:
-        """Return the kinds of cautions of a run."""
+    def outcomes(
+        self,
+        compiled: _Compiled,
+        case: Case,
+        points: Points,
+        results: np.ndarray,
+        refused: np.ndarray,
+    ) -> Outcomes:
+        """Return the outcomes of runs of a program."""
+        return Outcomes(
+            points.numbers,
+            tuple(compiled.places),
+            results[:, [*compiled.places.values()]],
+            Texts.where(refused, REFUSED),
+            self._cautions(compiled, case, points, results, refused),
+        )
 
-        def value(name: str) -> Value | None:
-            return self.value(point, name)
+    def refused(self, compiled: _Compiled, case: Case, points: Points) -> Outcomes:
+        """Return the outcomes of runs whose values a component refuses."""
+        results = np.full((len(points), compiled.source.n_indices), np.nan)
+        return self.outcomes(compiled, case, points, results, np.ones(len(points), dtype=bool))
 
-        every = cautions(value, point.step, self.loops)
-        for loop, places in zip(self.loops, compiled.watched, strict=True):
-            seen = {name: numbers[i] for name, i in places.items() if not isnan(numbers[i])}
-            every += cautions_of(seen, loop, value)
-        return kinds_of(every)
+    def _cautions(
+        self,
+        compiled: _Compiled,
+        case: Case,
+        points: Points,
+        results: np.ndarray,
+        refused: np.ndarray,
+    ) -> Texts:
+        """Return the kinds of cautions of runs, from their parameters and results."""
+        before, codes = self._before(case, points)
+        rows = np.column_stack(
+            [codes, *(results[:, place] > above for _, place, above in compiled.watched)]
+        )
+        is_warned = np.array([bool(found) for found in before], dtype=bool)[codes]
+        warned = np.flatnonzero((is_warned | rows[:, 1:].any(axis=1)) & ~refused)
+        distinct, places = np.unique(rows[warned], axis=0, return_inverse=True)
+        kinds = [kind for kind, *_ in compiled.watched]
+        texts = Texts.of(
+            [
+                ", ".join(dict.fromkeys([*before[code], *compress(kinds, marks)]))
+                for code, *marks in distinct.tolist()
+            ]
+        )
+        every = np.zeros(len(points), dtype=np.int32)
+        every[warned] = texts.codes[places]
+        return texts._replace(codes=every)
 
-    def value(self, point: Point, name: str) -> Value | None:
+    def _before(self, case: Case, points: Points) -> tuple[Sequence[Sequence[str]], np.ndarray]:
+        """Return kinds of cautions that are known before runs, and their places for each run."""
+        watched = {f"{loop.controller}.{name}" for loop in self.loops for name in OBSERVER}
+        names = {self.name(name): name for name in case.varied}
+        varied = {plain: name for plain, name in names.items() if plain in watched}
+        columns = [points.values[name].tolist() for name in varied.values()]
+        places = dict[tuple[Any, ...], int]()
+        codes = [
+            places.setdefault(key, len(places))
+            for key in zip(points.step.tolist(), *columns, strict=True)
+        ]
+        given = self.plain(case.parameters)
+        found = []
+        for step, *chosen in places:
+            values = {**given, **dict(zip(varied, chosen, strict=True))}
+            known = cautions(partial(self.value, values), step, self.loops)
+            found.append([caution.kind for caution in known])
+        return found, np.array(codes, dtype=int)
+
+    def value(self, parameters: Mapping[str, Value], name: str) -> Value | None:
         """Return the value of a parameter in a run; None if there is no such parameter."""
         value: Value | None
-        value = point.parameters[name] if name in point.parameters else self._values(name)
+        value = parameters[name] if name in parameters else self._values(name)
         return value
 
     @cached_property
@@ -264,17 +372,6 @@ class _Programs:
         return {**state, "_definitions": None, "_parameters": None}
 
 
-def _number(parameter: _Parameter, value: Any) -> float:
-    """Return the value of a parameter as a number.
-
-    Raises:
-        Refusal: the component would refuse it.
-
-    """
-    given: Any = parameter.items.get(value, value) if isinstance(value, str) else value
-    return float(parameter.port.checked(given))
-
-
 class BatchEngine:
     """Makes runs by compiled programs."""
 
@@ -283,6 +380,7 @@ class BatchEngine:
         systems: Mapping[str, System],
         own: Sequence[OwnIndex] = (),
         functions: Sequence[OwnFunction] = (),
+        runners: Runners = PROCESSOR,
     ) -> None:
         """Make an engine.
 
@@ -290,17 +388,20 @@ class BatchEngine:
             systems: by the names of scenarios in runs.
             own: the user's own indices.
             functions: those that are functions.
+            runners: what makes the runs of a program.
 
         Raises:
             InputError: a system cannot become a program.
 
         """
         self.functions = functions
+        self.runners = runners
+        self.least_runs, self.most_runs = runners.least_runs, runners.most_runs
         self._programs = dict[str, _Programs]()
         for name, system in systems.items():
             system.check()
             try:
-                self._programs[name] = _Programs(system, own)
+                self._programs[name] = _Programs(system, own, runners)
             except InputError as error:
                 raise InputError(f"{name}: {error}; {_ADVICE}") from None
 
@@ -309,50 +410,88 @@ class BatchEngine:
         """Hash of the code that makes programs and indices."""
         return code_of("auv_fmu", "fmus", "orchestrator.program", "orchestrator.vehicle")
 
-    def prepare(self, point: Point) -> None:
-        """Compile the program of a run.
+    def prepare(self, point: Point, is_here: bool = True) -> None:
+        """Translate the program of a run, and compile it if runs are made here.
 
         Raises:
             InputError: its system cannot become a program; the message has the reason.
 
         """
         try:
-            self._programs[point.scenario].compiled(point.order, point.step).program  # noqa: B018
+            compiled = self._programs[point.scenario].compiled(point.order, point.step)
+            if is_here:
+                compiled.program  # noqa: B018
         except InputError as error:
             raise InputError(f"{point.scenario}: {error}; {_ADVICE}") from None
 
-    def outcomes(self, points: Iterable[Point]) -> Iterator[Outcome]:
-        """Make runs, in their order."""
-        for point in points:
-            yield self._outcome(point)
+    def outcomes(self, points: Points) -> Iterator[Outcomes]:
+        """Make runs, some at a time."""
+        n = max(ceil(len(points) / _PARTS), self.least_runs)
+        for first in range(0, len(points), n):
+            part = points[first : first + n]
+            groups = [*self._groups(part)]
+            made = Outcomes.joined([self._outcomes(*group, part[rows]) for group, rows in groups])
+            order = np.argsort(np.concatenate([rows for _, rows in groups]))
+            yield made if len(groups) == 1 else made[order]
 
     def value(self, point: Point, name: str) -> Value | None:
         """Return the value of a parameter in a run; None if there is no such parameter."""
         programs = self._programs[point.scenario]
-        return programs.value(programs.plain(point), name)
+        return programs.value(programs.plain(point.parameters), name)
 
-    def _outcome(self, point: Point) -> Outcome:
-        programs = self._programs[point.scenario]
-        compiled = programs.compiled(point.order, point.step)
-        point, experiment = programs.plain(point), _experiment(point)
+    def _groups(
+        self, points: Points
+    ) -> Iterator[tuple[tuple[_Programs, _Compiled, Case], np.ndarray]]:
+        """Yield cases with their programs, and the places of their runs."""
+        for place in dict.fromkeys(points.case.tolist()):
+            case, rows = points.cases[place], np.flatnonzero(points.case == place)
+            programs = self._programs[case.scenario]
+            steps, codes = np.unique(points.step[rows], return_inverse=True)
+            made = [programs.compiled(case.order, step) for step in steps.tolist()]
+            for compiled in {id(each): each for each in made}.values():
+                is_own = np.array([each is compiled for each in made])
+                yield (programs, compiled, case), rows[is_own[codes]]
+
+    def _outcomes(
+        self, programs: _Programs, compiled: _Compiled, case: Case, points: Points
+    ) -> Outcomes:
+        """Make runs of the same case and program."""
         try:
-            values = programs.values(compiled, point.parameters)
+            values, refused = programs.values(compiled, case, points)
         except Refusal:
-            return Outcome(point.number, {}, REFUSED)
-        rows = None
+            return programs.refused(compiled, case, points)
+        rows = np.flatnonzero(~refused)
         if self.functions:
-            rows = np.empty((experiment.rows, 1 + len(compiled.source.columns)))
-        results = compiled.program.run(values, experiment, rows)
+            made = [programs.refused(compiled, case, points[refused])]
+            made += [
+                self._by_rows(programs, compiled, case, points[i : i + 1], values[i]) for i in rows
+            ]
+            order = np.argsort(np.concatenate([np.flatnonzero(refused), rows]))
+            return Outcomes.joined(made)[order]
+        results = np.full((len(points), compiled.source.n_indices), np.nan)
+        if len(rows):
+            grids = _grids(case, points[rows])
+            results[rows], refused[rows] = compiled.program.runs(values[rows], grids)
+        return programs.outcomes(compiled, case, points, results, refused)
+
+    def _by_rows(
+        self,
+        programs: _Programs,
+        compiled: _Compiled,
+        case: Case,
+        points: Points,
+        values: np.ndarray,
+    ) -> Outcomes:
+        """Make a run with its rows."""
+        [point] = points
+        experiment, rows = _with_rows(compiled, point)
+        results = compiled.on_processor.run(values, experiment, rows)
         if results is None:
-            return Outcome(point.number, {}, REFUSED)
-        numbers = results.tolist()
-        indices = compiled.indices(numbers)
-        outcome = Outcome(point.number, indices, None, programs.cautions(compiled, point, numbers))
-        if rows is None:
-            return outcome
-        return with_functions(
-            outcome, self.functions, programs.result(compiled, point, experiment, rows)
-        )
+            return programs.refused(compiled, case, points)
+        made = programs.outcomes(compiled, case, points, results[np.newaxis], np.zeros(1, bool))
+        [outcome] = made
+        result = programs.result(compiled, point, experiment, rows)
+        return Outcomes.of([with_functions(outcome, self.functions, result)])
 
     def table(self, point: Point) -> Result:
         """Make a run and return its rows.
@@ -363,19 +502,26 @@ class BatchEngine:
         """
         programs = self._programs[point.scenario]
         compiled = programs.compiled(point.order, point.step)
-        point, experiment = programs.plain(point), _experiment(point)
-        rows = np.empty((experiment.rows, 1 + len(compiled.source.columns)))
+        experiment, rows = _with_rows(compiled, point)
+        points = Points.of([point])
         try:
-            values = programs.values(compiled, point.parameters)
+            [values], _ = programs.values(compiled, points.cases[0], points)
         except Refusal as refusal:
             raise InputError(str(refusal)) from None
-        if compiled.program.run(values, experiment, rows) is None:
+        if compiled.on_processor.run(values, experiment, rows) is None:
             raise InputError(f"{point.scenario}: a component has refused")
         return programs.result(compiled, point, experiment, rows)
 
 
-_experiments: Callable[..., Experiment] = lru_cache(Experiment)
+def _with_rows(compiled: _Compiled, point: Point) -> tuple[Experiment, np.ndarray]:
+    """Return the experiment of a run, and an array for its rows."""
+    experiment = Experiment(point.stop_time, point.step, point.order, point.start_time)
+    return experiment, np.empty((experiment.rows, 1 + len(compiled.source.columns)))
 
 
-def _experiment(point: Point) -> Experiment:
-    return _experiments(point.stop_time, point.step, point.order, point.start_time)
+def _grids(case: Case, points: Points) -> Grids:
+    """Return the times and steps of runs of a case; most of them are equal."""
+    pairs = [*zip(points.stop_time.tolist(), points.step.tolist(), strict=True)]
+    places = {pair: place for place, pair in enumerate(dict.fromkeys(pairs))}
+    distinct = Grids.of(Experiment(*pair, case.order, case.start_time) for pair in places)
+    return distinct.rows(np.array([places[pair] for pair in pairs]))

@@ -14,17 +14,21 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
+from math import inf
 from pathlib import Path
 from threading import Event
 from time import monotonic
 from typing import NamedTuple, Protocol
+
+import numpy as np
 
 from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.machine.interrupts import held_interrupts
 from orchestrator.machine.workers import Workers, cores
 from orchestrator.machine.workers import workers as workers_of
-from orchestrator.studies.engine import Engine, Outcome, Point
+from orchestrator.studies.columns import Outcome, Outcomes, Points
+from orchestrator.studies.engine import Engine
 
 #: Intended duration of a block [s], much longer than the millisecond that a task costs, but short
 #: for a user who waits for the last block, or loses it. A block that takes longer than this
@@ -33,9 +37,6 @@ _SECONDS, _OVERTIME = 1.5, 2.0
 
 #: Largest number of blocks per second that a scheduler gets: on large clusters they are longer.
 _RATE = 200.0
-
-#: Largest number of runs in a block.
-_MOST_RUNS = 10_000
 
 #: Number of times that a block is repeated on this machine before its runs are made one by one.
 _LOSSES = 1
@@ -47,7 +48,7 @@ FATAL = "every process that ran it died"
 _engine: list[Engine] = []
 
 #: Duration of a block [s], and the outcomes of its runs, or of the first ones if it took too long.
-Answer = tuple[float, list[Outcome]]
+Answer = tuple[float, Outcomes]
 
 
 class BlockWorkers(Protocol):
@@ -64,10 +65,10 @@ class BlockWorkers(Protocol):
     @property
     def threads(self) -> int: ...
 
-    def send(self, block: list[Point], limit: float) -> None:
+    def send(self, block: Points, limit: float) -> None:
         """Start a block; after `limit` seconds the runs that are done are returned."""
 
-    def receive(self) -> tuple[list[Point], Answer | None]:
+    def receive(self) -> tuple[Points, Answer | None]:
         """Wait for a block; return it with its answer, or None if all its processes died.
 
         Raises:
@@ -107,7 +108,7 @@ def local_workers(n: int | None, engine: Engine) -> Iterator[BlockWorkers]:
 class _Sent(NamedTuple):
     """A block under way, its limit [s], and how many more times it may be repeated."""
 
-    block: list[Point]
+    block: Points
     limit: float
     left: int
 
@@ -117,16 +118,16 @@ class _Local:
 
     ahead = 1
 
-    def __init__(self, workers: Workers, task: Callable[[list[Point], float], Answer]) -> None:
+    def __init__(self, workers: Workers, task: Callable[[Points, float], Answer]) -> None:
         self._workers, self._task, self.threads = workers, task, workers.n
         self._under_way: dict[Future[Answer], _Sent] = {}
-        self._put_aside: list[list[Point]] = []
+        self._put_aside: list[Points] = []
 
-    def send(self, block: list[Point], limit: float, left: int = _LOSSES) -> None:
+    def send(self, block: Points, limit: float, left: int = _LOSSES) -> None:
         future = self._workers.submit(self._task, block, limit)
         self._under_way[future] = _Sent(block, limit, left)
 
-    def receive(self) -> tuple[list[Point], Answer | None]:
+    def receive(self) -> tuple[Points, Answer | None]:
         while not self._put_aside:
             future = next(iter(self._workers.done(self._under_way)))
             try:
@@ -176,71 +177,73 @@ def _set_up(file: Path) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream)
 
 
-def _task(block: list[Point], limit: float) -> Answer:
+def _task(block: Points, limit: float) -> Answer:
     return answer(_engine[0], block, limit)
 
 
-def answer(engine: Engine, points: list[Point], limit: float, ends: Event | None = None) -> Answer:
+def answer(engine: Engine, points: Points, limit: float, ends: Event | None = None) -> Answer:
     """Make runs; stop after `limit` seconds, or if `ends` is set, and return what is done."""
-    start, seconds, outcomes = monotonic(), 0.0, []
-    for outcome in engine.outcomes(points):
-        outcomes.append(outcome)
+    start, seconds, made = monotonic(), 0.0, list[Outcomes]()
+    for outcomes in engine.outcomes(points):
+        made.append(outcomes)
         seconds = monotonic() - start
         if seconds > limit or (ends is not None and ends.is_set()):
             break
-    return seconds, outcomes
+    return seconds, Outcomes.joined(made)
 
 
-def cannot_make(block: list[Point], error: Exception) -> InputError:
+def cannot_make(block: Points, error: Exception) -> InputError:
     """Return the error for an engine that raises, or that lacks a package on a worker."""
     if isinstance(error, InputError):
         return error
-    numbers = f"{block[0].number} to {block[-1].number}"
+    numbers = f"{block.numbers[0]} to {block.numbers[-1]}"
     return InputError(f"runs {numbers} cannot be made: {reason(error)}")
 
 
 class Blocks:
     """Blocks of runs, sent to workers and received."""
 
-    def __init__(self, workers: BlockWorkers) -> None:
-        self._workers = workers
-        self._pace = float("inf")  # seconds per step
+    def __init__(self, workers: BlockWorkers, engine: Engine) -> None:
+        self._workers, self._engine = workers, engine
+        self._pace = inf  # seconds per step
 
-    def outcomes(self, points: Iterable[Point]) -> Iterator[list[Outcome]]:
+    def outcomes(self, points: Iterable[Points]) -> Iterator[Outcomes]:
         """Yield the outcomes of runs, block by block as they are done."""
-        lost: list[Point] = []
+        lost: list[Points] = []
         for block, outcomes in self._made(self._blocks(points), self._room):
             if outcomes is None:
-                lost.extend(block)
+                lost.append(block)
             else:
                 yield outcomes
         # One by one, so that only the run that ends its process fails.
-        for (point,), outcomes in self._made(([point] for point in lost), lambda: 1):
-            yield outcomes or [Outcome(point.number, {}, FATAL)]
+        single = (block[i : i + 1] for block in lost for i in range(len(block)))
+        for block, outcomes in self._made(single, lambda: 1):
+            [number] = block.numbers.tolist()
+            yield outcomes or Outcomes.of([Outcome(number, {}, FATAL)])
 
-    def _blocks(self, points: Iterable[Point]) -> Iterator[list[Point]]:
+    def _blocks(self, points: Iterable[Points]) -> Iterator[Points]:
         """Yield runs in their order, in blocks of the intended duration."""
-        block: list[Point] = []
-        steps = 0.0
-        for point in points:
-            block.append(point)
-            steps += point.steps
-            if steps * self._pace >= self._seconds or len(block) == _MOST_RUNS:
-                yield block
-                block, steps = [], 0.0
-        if block:
-            yield block
+        least, most = self._engine.least_runs, self._engine.most_runs
+        for some in points:
+            steps, first = some.steps.cumsum(), 0
+            while first < len(some):
+                before = steps[first - 1] if first else 0.0
+                room = self._seconds / self._pace if self._pace else inf
+                n = 1 + int(np.searchsorted(steps[first:], before + room))
+                n = min(max(n, least), most)
+                yield some[first : first + n]
+                first += n
 
     def _made(
-        self, blocks: Iterator[list[Point]], room: Callable[[], int]
-    ) -> Iterator[tuple[list[Point], list[Outcome] | None]]:
+        self, blocks: Iterator[Points], room: Callable[[], int]
+    ) -> Iterator[tuple[Points, Outcomes | None]]:
         """Yield blocks as they are done with their outcomes, or None if each worker died.
 
         `room` returns the number of blocks that may be under way.
         """
         under_way = 0
-        rests: deque[list[Point]] = deque()
-        done: list[tuple[list[Point], list[Outcome] | None]] = []
+        rests: deque[Points] = deque()
+        done: list[tuple[Points, Outcomes | None]] = []
         while True:
             while under_way < room():
                 block = rests.popleft() if rests else next(blocks, None)
@@ -259,7 +262,7 @@ class Blocks:
                 seconds, outcomes = answer
                 n = len(outcomes)
                 rests.extend(block[i : i + n] for i in range(n, len(block), n))
-                self._pace = seconds / sum(point.steps for point in block[:n])
+                self._pace = seconds / float(block[:n].steps.sum())
 
     def _room(self) -> int:
         return max(1, self._workers.ahead * self._workers.threads)

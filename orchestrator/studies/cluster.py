@@ -23,7 +23,8 @@ from distributed.utils import silence_logging_cmgr
 from auv_fmu import __version__
 from orchestrator.machine.errors import InputError, reason
 from orchestrator.studies.blocks import Answer, BlockWorkers, answer, cannot_make
-from orchestrator.studies.engine import Engine, Point
+from orchestrator.studies.columns import Points
+from orchestrator.studies.engine import Engine
 
 #: Interval between counts of the workers, and time that there may be none [s].
 _GLANCE, _PATIENCE = 2.0, 120.0
@@ -119,7 +120,7 @@ class _Share(WorkerPlugin):  # type: ignore[misc]
         # One run at a time in each process: an FMU is a library of the process.
         self._lock, self._address = Lock(), worker.address
 
-    def answer(self, points: list[Point], limit: float) -> Answer:
+    def answer(self, points: Points, limit: float) -> Answer:
         if __version__ != self._version:
             raise InputError(
                 f"the worker at {self._address} has auv-fmu {__version__}, and the sender of the "
@@ -144,7 +145,7 @@ class _Cluster:
     def __init__(self, client: Client, name: str) -> None:
         self._client, self._name = client, name
         self._threads, self._counted, self._seen = 1, float("-inf"), monotonic()
-        self._under_way: dict[Future, list[Point]] = {}
+        self._under_way: dict[Future, Points] = {}
         self._done: SimpleQueue[Future] = SimpleQueue()
 
     @property
@@ -152,12 +153,12 @@ class _Cluster:
         self._count()
         return self._threads
 
-    def send(self, block: list[Point], limit: float) -> None:
+    def send(self, block: Points, limit: float) -> None:
         future = self._client.submit(_task, self._name, pickle.dumps(block), limit, pure=False)
         self._under_way[future] = block
         future.add_done_callback(self._done.put)
 
-    def receive(self) -> tuple[list[Point], Answer | None]:
+    def receive(self) -> tuple[Points, Answer | None]:
         future = self._next()
         block = self._under_way.pop(future)
         try:

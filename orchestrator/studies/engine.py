@@ -1,4 +1,4 @@
-"""Runs of a study, their outcomes, and the engine that makes them with FMUs.
+"""Engines, which make the runs of a study, and the one that makes them with FMUs.
 
 The other engine (:mod:`.batch_engine`) runs a system of components in the language of equations as
 one compiled program. Both give the same numbers.
@@ -9,63 +9,20 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
-from orchestrator.cosim import Order, Plan, PortName, make_plan
+from orchestrator.cosim import Plan, PortName, make_plan
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.identity import code_of
 from orchestrator.machine.user_files import read_archive
 from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.result import Result
+from orchestrator.studies.columns import Outcome, Outcomes, Point, Points
 from orchestrator.studies.own_functions import OwnFunction
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import Caution, Watch, cautions, values_of
 from orchestrator.vehicle.indices import Indices
 from orchestrator.vehicle.signals import loops_of
-
-
-class Point(NamedTuple):
-    """One run of a study.
-
-    Attributes:
-        number: in the study, from 0.
-        scenario: name or path.
-        parameters: by `component.parameter`, without those of the scenario.
-        stop_time, step: of the experiment [s].
-        order: of evaluation.
-        start_time: of the experiment [s].
-
-    """
-
-    number: int
-    scenario: str
-    parameters: Mapping[str, Any]
-    stop_time: float
-    step: float
-    order: Order | None = None
-    start_time: float = 0.0
-
-    @property
-    def steps(self) -> float:
-        """Length of the run in steps."""
-        return (self.stop_time - self.start_time) / self.step
-
-
-class Outcome(NamedTuple):
-    """The outcome of a run.
-
-    Attributes:
-        number: of the run.
-        indices: by their columns, :func:`.index_columns`; none if the run failed.
-        failure: reason why the run ended early, or None.
-        cautions: keys of :data:`.cautions.CAUTIONS` with commas between them, or None.
-
-    """
-
-    number: int
-    indices: Mapping[str, float]
-    failure: str | None = None
-    cautions: str | None = None
 
 
 def kinds_of(cautions: Iterable[Caution]) -> str | None:
@@ -95,17 +52,35 @@ class Engine(Protocol):
     functions: Sequence[OwnFunction]
 
     @property
+    def least_runs(self) -> int:
+        """Number of runs that take about as long as a single one."""
+        ...
+
+    @property
+    def most_runs(self) -> int:
+        """Largest number of runs in a block."""
+        ...
+
+    @property
     def digest(self) -> str:
         """Hash of the code, on which the numbers depend besides the systems."""
         ...
 
-    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
-        """Make runs of the study that the engine was made for, in their order."""
+    def outcomes(self, points: Points) -> Iterator[Outcomes]:
+        """Make runs of the study that the engine was made for, some at a time, in their order."""
         ...
+
+
+def outcomes_of(engine: Engine, points: Iterable[Point]) -> Iterator[Outcome]:
+    """Make single runs."""
+    for point in points:
+        yield from chain(*engine.outcomes(Points.of([point])))
 
 
 class FmuEngine:
     """Makes runs with FMUs in the calling process."""
+
+    least_runs, most_runs = 1, 10_000
 
     def __init__(
         self,
@@ -131,8 +106,8 @@ class FmuEngine:
         """Hash of the code that computes the indices."""
         return code_of("orchestrator.vehicle", "orchestrator.studies")
 
-    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
-        """Make runs, in their order.
+    def outcomes(self, points: Points) -> Iterator[Outcomes]:
+        """Make runs, one by one.
 
         Raises:
             KeyboardInterrupt: there was a signal to stop.
@@ -140,9 +115,10 @@ class FmuEngine:
         """
         for point in points:
             try:
-                yield self._outcome(point)
+                outcome = self._outcome(point)
             except InputError as error:
-                yield Outcome(point.number, {}, str(error))
+                outcome = Outcome(point.number, {}, str(error))
+            yield Outcomes.of([outcome])
 
     def _outcome(self, point: Point) -> Outcome:
         prepared = self._prepared[point.scenario]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dis
 import pickle
 import sys
-from collections.abc import Callable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
 from dataclasses import dataclass, replace
 from functools import partial
 from hashlib import sha256
@@ -47,9 +47,9 @@ class OwnFunction:
         content = [*_made_of(self.function, None, []), *self.columns]
         return sha256("\0".join(content).encode(errors="surrogatepass")).hexdigest()
 
-    def with_columns(self, outcome: Mapping[str, float]) -> Self:
-        """Return the index with its columns, found among the numbers of a run."""
-        return replace(self, columns=tuple(name for name in outcome if matches(name, self.name)))
+    def with_columns(self, columns: Iterable[str]) -> Self:
+        """Return the index with its columns, found among all columns of a run."""
+        return replace(self, columns=tuple(name for name in columns if matches(name, self.name)))
 
     def values(self, result: Result) -> dict[str, float]:
         """Return the numbers of a run, by their columns.

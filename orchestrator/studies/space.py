@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from hashlib import sha256
 from itertools import chain, product
-from math import ceil, cos, floor, log2, pi, prod, sin, sqrt
+from math import cos, pi, prod, sin
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from orchestrator.machine.texts import is_finite, literal
 from orchestrator.runs.preparation import Prepared, prepare
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import Scenario
-from orchestrator.studies.engine import Point
+from orchestrator.studies.columns import Case, Point, Points
 from orchestrator.studies.study import (
     LATIN_HYPERCUBE,
     LOG_SPACING,
@@ -32,8 +33,12 @@ from orchestrator.studies.study import (
 from orchestrator.vehicle.indices import Index, index_columns, index_units
 from orchestrator.vehicle.signals import loops_of
 
-#: Types of values by the types of FMI variables.
+#: Types of values by the types of FMI variables, and types of columns.
 _TYPES = {"Real": float, "Integer": int, "Enumeration": str, "Boolean": bool, "String": str}
+_ARRAYS: Mapping[type, Any] = {float: np.float64, int: np.int64, bool: np.bool_, str: np.object_}
+
+#: Number of samples that are drawn at once: a power of two, which Sobol's sequence needs.
+_PAGE = 1 << 14
 
 
 class Space:
@@ -104,8 +109,8 @@ class Space:
                     raise InputError(f"{name}: an integer cannot be part of a norm")
                 for end in ends:
                     known.typed(name, end)
-        samples = study.sample.n if study.sample else 1
-        self._n = prod(map(len, study.vary.values())) * samples * len(self._scenarios)
+        self._samples = study.sample.n if study.sample else 1
+        self._n = prod(map(len, study.vary.values())) * self._samples * len(self._scenarios)
         if self._n > MOST_RUNS:
             findings.problem(f"{study.name}: {self._n:,} runs are more than {MOST_RUNS:,}")
         given: dict[str, Any] = {}
@@ -118,7 +123,7 @@ class Space:
                     raise InputError(f"{study.name}: {name} is stated twice")
                 self._constants[name] = known.typed(name, value)
         findings.refuse()
-        self._points = draw_shares(study.sample) if study.sample else np.empty((1, 0))
+        self._shares = _Shares(study.sample) if study.sample else None
         names = {name for name in (*given, *study.varied) if name != STEP}
         self._has = {
             scenario: {name for name in names if system.has(PortName.read(name))}
@@ -137,13 +142,14 @@ class Space:
 
     def _prepared(self, name: str, study: Study, scenario: Scenario, system: System) -> Prepared:
         """Prepare the shortest run of a scenario."""
-        _, chosen = self.chosen(0)
+        _, first = self._chosen(np.zeros(1, dtype=np.int64))
+        chosen = {name: column.tolist()[0] for name, column in first.items()}
         shortest = study.stop_time and study.stop_time.base + sum(
             min(rate * end for end in self._ends(varied))
             for varied, rate in study.stop_time.per.items()
         )
         request = Request(
-            parameters=self._parameters(name, chosen),
+            parameters=self._of(name, {**self._constants, **chosen}),
             stop_time=shortest,
             step=chosen.get(STEP, study.step),
             order=study.order,
@@ -157,10 +163,24 @@ class Space:
         """Return the values of a grid, or the two ends of a range."""
         return [float(value) for value in self._grid.get(name) or self._limits[name]]
 
-    def _parameters(self, scenario: str, chosen: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the parameters of a run that its scenario has."""
+    @cached_property
+    def _cases(self) -> Sequence[Case]:
+        """The common properties of the runs of each scenario."""
+        return [
+            Case(
+                name,
+                self._of(name, self._constants),
+                tuple(self._of(name, self.columns)),
+                self.prepared[name].experiment.order,
+                self.prepared[name].experiment.start_time,
+            )
+            for name in self._scenarios
+        ]
+
+    def _of(self, scenario: str, values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the values whose names are parameters of a scenario."""
         has = self._has[scenario]
-        return {name: value for name, value in {**self._constants, **chosen}.items() if name in has}
+        return {name: value for name, value in values.items() if name in has}
 
     def __len__(self) -> int:
         """Return the number of runs."""
@@ -170,36 +190,41 @@ class Space:
         """Return a run."""
         if not 0 <= number < self._n:
             raise IndexError(number)
-        scenario, chosen = self.chosen(number)
-        experiment = self.prepared[scenario].experiment
-        return Point(
-            number,
-            scenario,
-            self._parameters(scenario, chosen),
-            self._stop_time.at(chosen) if self._stop_time else experiment.stop_time,
-            chosen.get(STEP, experiment.step),
-            experiment.order,
-            experiment.start_time,
-        )
+        [point] = self.points(np.array([number]))
+        return point
 
-    def chosen(self, number: int) -> tuple[str, dict[str, Any]]:
-        """Return the scenario of a run, and the values that vary, by name."""
-        place, scenario = divmod(number, len(self._scenarios))
-        combination, sample = divmod(place, len(self._points))
-        chosen: dict[str, Any] = {}
+    def points(self, numbers: np.ndarray) -> Points:
+        """Return some runs."""
+        case, values = self._chosen(numbers)
+        every = [self.prepared[name].experiment for name in self._scenarios]
+        if self._stop_time:
+            stop_time = self._stop_time.at(values, len(numbers))
+        else:
+            stop_time = np.array([experiment.stop_time for experiment in every])[case]
+        step = values.get(STEP)
+        if step is None:
+            step = np.array([experiment.step for experiment in every])[case]
+        return Points(numbers, self._cases, case, values, stop_time, step)
+
+    def _chosen(self, numbers: np.ndarray) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """Return the places of the scenarios of runs, and the values that vary, by name."""
+        place, case = np.divmod(numbers, len(self._scenarios))
+        combination, sample = np.divmod(place, self._samples)
+        chosen: dict[str, np.ndarray] = {}
         for name, values in reversed(self._grid.items()):
-            combination, i = divmod(combination, len(values))
-            chosen[name] = values[i]
-        shares = iter(self._points[sample].tolist())
+            combination, i = np.divmod(combination, len(values))
+            chosen[name] = np.array(values, dtype=_ARRAYS[self.columns[name]])[i]
+        shares = iter(() if self._shares is None else self._shares.of(sample).T)
         for key, limits in self._ranges.items():
             size = between(limits, next(shares), self.columns[norm_members(key)[0]] is int)
             chosen |= zip(norm_members(key), _direct(key, size, shares), strict=True)
-        return self._scenarios[scenario], chosen
+        return case, chosen
 
     @property
     def digest(self) -> str:
-        """Hash of all values that vary."""
-        content = repr((self._grid, self._ranges)).encode() + self._points.tobytes()
+        """Hash of the values that vary: grids, ranges and the first samples."""
+        shares = b"" if self._shares is None else self._shares.of(np.arange(1)).tobytes()
+        content = repr((self._grid, self._ranges, self._samples)).encode() + shares
         return sha256(content).hexdigest()
 
 
@@ -255,44 +280,89 @@ def _variable(system: System, name: PortName) -> Variable:
     return system.variable(system.named(name))
 
 
-def between(limits: Range, share: float, whole: bool) -> float | int:
-    """Return the value at a share of a range; whole numbers have equal shares."""
+# Powers, sines and cosines are Python's, since the last bits of numpy's may differ.
+
+
+def between(limits: Range, shares: np.ndarray, whole: bool) -> np.ndarray:
+    """Return the values at shares of a range; whole numbers have equal shares."""
     low, high, spacing = limits
     if whole:
         low, high = min(low, high), max(low, high) + 1
-    value = low * (high / low) ** share if spacing == LOG_SPACING else low + (high - low) * share
-    return min(floor(value), int(high) - 1) if whole else value
+    if spacing == LOG_SPACING:
+        ratio = high / low
+        values = float(low) * np.array([ratio**share for share in shares.tolist()])
+    else:
+        values = float(low) + float(high - low) * shares
+    return np.minimum(np.floor(values).astype(np.int64), int(high) - 1) if whole else values
 
 
-def _direct(key: str, size: float, shares: Iterator[float]) -> tuple[float, ...]:
-    """Return the members of a norm, with a direction from the next shares, evenly distributed."""
+def _direct(key: str, size: np.ndarray, shares: Iterator[np.ndarray]) -> tuple[np.ndarray, ...]:
+    """Return the members of a norm, with directions from the next shares, evenly distributed."""
     if (n := len(norm_members(key))) == 1:
         return (size,)
-    angle = 2.0 * pi * next(shares)
-    z = 2.0 * next(shares) - 1.0 if n == 3 else 0.0
-    across = size * sqrt(1.0 - z * z)
-    return (across * cos(angle), across * sin(angle), size * z)[:n]
+    angles = (2.0 * pi * next(shares)).tolist()
+    z = 2.0 * next(shares) - 1.0 if n == 3 else np.zeros(len(size))
+    across = size * np.sqrt(1.0 - z * z)
+    cosines, sines = (np.array([*map(function, angles)]) for function in (cos, sin))
+    return (across * cosines, across * sines, size * z)[:n]
 
 
-def draw_shares(sample: Sample) -> np.ndarray:
-    """Return shares of the ranges, (samples, values), which follow from the seed and the method.
+class _Shares:
+    """Shares of the ranges, which follow from the seed and the method of a sample.
 
-    Raises:
-        InputError: the method cannot draw so many.
-
+    They are drawn page by page, in any order, but soonest in their own.
     """
-    from scipy.stats import qmc  # noqa: PLC0415
 
-    n, width = sample.n, len(sample.names)
-    generator = np.random.default_rng(sample.seed)
-    try:
-        if sample.method == SOBOL:
-            # The first of a power of two, for which the sequence is made.
-            points: np.ndarray = qmc.Sobol(width, rng=generator).random_base2(ceil(log2(n)))[:n]
-        elif sample.method == LATIN_HYPERCUBE:
-            points = qmc.LatinHypercube(width, rng=generator).random(n)
-        else:
-            points = generator.random((n, width))
-    except ValueError as error:
-        raise InputError(f"sample: {reason(error)}") from error
-    return points
+    def __init__(self, sample: Sample) -> None:
+        """Begin.
+
+        Raises:
+            InputError: the method cannot draw so many.
+
+        """
+        from scipy.stats import qmc  # noqa: PLC0415
+
+        self._sample, self._width = sample, len(sample.names)
+        self._recent: dict[int, np.ndarray] = {}
+        generator = np.random.default_rng(sample.seed)
+        try:
+            if sample.method == SOBOL:
+                self._sobol = qmc.Sobol(self._width, rng=generator)
+            elif sample.method == LATIN_HYPERCUBE:
+                # At once, since each sample depends on all others.
+                self._every = qmc.LatinHypercube(self._width, rng=generator).random(sample.n)
+        except ValueError as error:
+            raise InputError(f"sample: {reason(error)}") from error
+
+    def of(self, samples: np.ndarray) -> np.ndarray:
+        """Return the shares of some samples, (samples, values)."""
+        if self._sample.method == LATIN_HYPERCUBE:
+            every: np.ndarray = self._every[samples]
+            return every
+        shares = np.empty((len(samples), self._width))
+        pages = samples // _PAGE
+        for number in np.unique(pages).tolist():
+            rows = np.flatnonzero(pages == number)
+            shares[rows] = self._page(number)[samples[rows] % _PAGE]
+        return shares
+
+    def _page(self, number: int) -> np.ndarray:
+        """Return a page; the last two are kept."""
+        if number not in self._recent:
+            self._recent = dict([*self._recent.items()][-1:])
+            self._recent[number] = self._drawn(number * _PAGE)
+        return self._recent[number]
+
+    def _drawn(self, first: int) -> np.ndarray:
+        """Draw a page."""
+        if self._sample.method == SOBOL:
+            if first < self._sobol.num_generated:
+                self._sobol.reset()
+            if ahead := first - self._sobol.num_generated:
+                self._sobol.fast_forward(ahead)
+            page: np.ndarray = self._sobol.random(_PAGE)
+            return page
+        generator = np.random.default_rng(self._sample.seed)
+        # PCG64, which draws a double from each of its numbers.
+        generator.bit_generator.advance(first * self._width)  # type: ignore[attr-defined]
+        return generator.random((_PAGE, self._width))

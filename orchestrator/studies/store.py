@@ -1,9 +1,10 @@
 """Files of a study: a database while it runs, then a table of all runs and a record.
 
-The database gets a transaction for each block of outcomes: whatever happens to this process, it
-contains whole blocks, and each run once. The checksum of a row includes the random token of the
-database, so that changed rows and rows of other databases are detected. When all runs are done they
-are written into one table, sorted by number, and the database is removed.
+The database gets a transaction for each block of outcomes, and a row for it: whatever happens to
+this process, it contains whole blocks, and each run once. The checksum of a row includes the random
+token of the database, so that changed rows and rows of other databases are detected. When all runs
+are done they are written into one table, sorted by number, and the database is removed. At any time
+only some blocks are in memory.
 """
 
 from __future__ import annotations
@@ -12,15 +13,15 @@ import json
 import os
 import sqlite3
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import cached_property
 from hashlib import sha256
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import chain, islice, pairwise
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,11 +30,11 @@ from orchestrator.machine.disk import move_aside
 from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.machine.identity import differences
 from orchestrator.runs.folder import Ledger, is_changed, locate, open_ledger
+from orchestrator.studies.columns import Numbers, Outcomes, Texts
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from orchestrator.studies.engine import Outcome
     from orchestrator.studies.space import Space
 
 #: The table of all runs, and the record.
@@ -45,7 +46,7 @@ RUN = "run"
 #: The database, until all runs are done.
 _DATABASE = "unfinished.sqlite"
 
-#: Number of rows of the table that are written at once.
+#: Largest number of runs in a row of the database, and least number in a part of the table.
 _ROWS = 65_536
 
 #: Suffixes of SQLite's files, and length of the beginning of the database with the token [bytes].
@@ -54,15 +55,6 @@ _ENDS, _PAGES = ("", "-wal", "-shm", "-journal"), 16_384
 #: Only this process opens the database, so it needs no shared memory, which network file systems
 #: lack. A block outlasts the process as soon as it is written, and a power cut soon afterwards.
 _SETTINGS = ("locking_mode = EXCLUSIVE", "journal_mode = WAL", "synchronous = NORMAL")
-
-
-class _Row(NamedTuple):
-    """An outcome in the database, without its checksum; indices are the bytes of doubles."""
-
-    number: int
-    indices: bytes
-    failure: str | None
-    cautions: str | None
 
 
 class Store:
@@ -103,7 +95,9 @@ class Store:
         for setting in _SETTINGS:
             self._database.execute(f"PRAGMA {setting}")
         # Reading all rows checks them before any run is added.
-        self._done = [number for number, *_ in self._rows()]
+        self._done = Numbers()
+        for block in self._blocks():
+            self._done.add(Numbers.of(block.numbers))
 
     def close(self) -> None:
         """Close the database."""
@@ -118,38 +112,44 @@ class Store:
                 self._remove_database()
                 self.ledger.remove([STUDY_RECORD])
 
-    def missing(self, n: int) -> Iterator[int]:
-        """Yield the numbers below n of runs that were not done when the store was opened."""
-        for before, after in pairwise([-1, *self._done, n]):
-            yield from range(before + 1, after)
+    def missing(self, n: int) -> Numbers:
+        """Return the numbers below n of runs that are not done."""
+        return self._done.below(n)
 
-    def add(self, outcomes: Sequence[Outcome]) -> None:
-        """Add a block of outcomes: all or none."""
-        rows = ((*row, self._checksum(*row)) for row in map(self._row, outcomes))
+    def add(self, outcomes: Outcomes) -> None:
+        """Add a block of outcomes, all or none; a run that is done is left out."""
+        order = np.argsort(outcomes.numbers)
+        order = order[~self._done.has(outcomes.numbers[order])]
+        if not np.array_equal(order, np.arange(len(outcomes))):
+            outcomes = outcomes[order]
+        parts = (outcomes[first : first + _ROWS] for first in range(0, len(outcomes), _ROWS))
         with _explained_errors(self._folder), self._database:
             self._database.executemany(
-                "INSERT OR IGNORE INTO outcomes VALUES (?, ?, ?, ?, ?)", rows
+                "INSERT INTO blocks VALUES (?, ?, ?, ?, ?, ?)", map(self._row, parts)
             )
+        self._done.add(Numbers.of(outcomes.numbers))
 
     def __len__(self) -> int:
         """Return the number of runs that are done."""
-        [(n,)] = self._database.execute("SELECT count(*) FROM outcomes")
-        return int(n)
+        return len(self._done)
 
     def publish(self, space: Space) -> None:
         """Write the table of all runs, sorted by number, and remove the database."""
         arrow, parquet = import_module("pyarrow"), import_module("pyarrow.parquet")
         if len(self) != len(space):
             raise InputError(f"{self._path}: damaged: it holds {len(self)} of {len(space)} runs")
-        rows = self._rows()
         schema = _schema(arrow, space, self._indices)
+        # Indices hardly ever repeat.
+        repeating = [name for name in schema.names if name not in (RUN, *self._indices)]
         with (
             _explained_errors(self._folder),
             self.ledger.changing() as unfinished,
-            parquet.ParquetWriter(unfinished / STUDY_TABLE, schema) as writer,
+            parquet.ParquetWriter(
+                unfinished / STUDY_TABLE, schema, use_dictionary=repeating
+            ) as writer,
         ):
-            while block := list(islice(rows, _ROWS)):
-                writer.write_batch(_batch(arrow, schema, space, block))
+            for part in self._sorted():
+                writer.write_batch(_batch(arrow, schema, space, part))
         self.close()
         self.is_done = True
         self._remove_database()
@@ -163,32 +163,75 @@ class Store:
         with self.ledger.changing() as unfinished:
             (unfinished / STUDY_RECORD).write_text(text, encoding="utf-8")
 
-    def _rows(self) -> Iterator[_Row]:
-        """Yield all outcomes, sorted by number.
+    def _sorted(self) -> Iterator[Outcomes]:
+        """Yield all outcomes in the order of their numbers, some at a time.
+
+        Blocks overlap where some runs were repeated by another engine.
+        """
+        ready, waiting = list[Outcomes](), list[Outcomes]()
+        for block in chain(self._blocks(), [None]):
+            ends = [
+                len(each) if block is None else int(np.searchsorted(each.numbers, block.numbers[0]))
+                for each in waiting
+            ]
+            parts = [each[:end] for each, end in zip(waiting, ends, strict=True) if end]
+            if len(parts) > 1:
+                both = Outcomes.joined(parts)
+                parts = [both[np.argsort(both.numbers)]]
+            ready += parts
+            waiting = [
+                each[end:] for each, end in zip(waiting, ends, strict=True) if end < len(each)
+            ]
+            if ready and (block is None or sum(map(len, ready)) >= _ROWS):
+                yield Outcomes.joined(ready)
+                ready.clear()
+            if block is not None:
+                waiting.append(block)
+
+    def _blocks(self) -> Iterator[Outcomes]:
+        """Yield the blocks, sorted by their first numbers.
 
         Raises:
             InputError: one was changed since it was written.
 
         """
         with _explained_errors(self._folder):
-            for *row, checksum in self._database.execute("SELECT * FROM outcomes ORDER BY number"):
+            for *row, checksum in self._database.execute("SELECT * FROM blocks ORDER BY first"):
                 if checksum != self._checksum(*row):
                     raise InputError(
-                        f"{self._path}: damaged: run {row[0]} was changed since it was written; "
-                        "move it, or let --force move the study aside and start over"
+                        f"{self._path}: damaged: runs from {row[0]} on were changed since they "
+                        "were written; move it, or let --force move the study aside and start over"
                     )
-                yield _Row(*row)
+                _, ends, indices, codes, texts = row
+                numbers = next(Numbers(np.frombuffer(ends, dtype=np.int64)).blocks(_ROWS))
+                failures, cautions = (
+                    Texts(part, known)
+                    for part, known in zip(
+                        np.frombuffer(codes, dtype=np.int32).reshape(2, -1),
+                        json.loads(texts),
+                        strict=True,
+                    )
+                )
+                values = np.frombuffer(indices).reshape(-1, len(numbers)).T
+                yield Outcomes(numbers, self._indices, values, failures, cautions)
 
-    def _row(self, outcome: Outcome) -> _Row:
-        values = [outcome.indices.get(name, np.nan) for name in self._indices]
-        indices = np.array(values).tobytes()
-        return _Row(outcome.number, indices, outcome.failure, outcome.cautions)
+    def _row(self, block: Outcomes) -> tuple[Any, ...]:
+        """Return a block for the database; indices are the bytes of doubles, column by column."""
+        row = (
+            int(block.numbers[0]),
+            Numbers.of(block.numbers).ends.tobytes(),
+            block.arranged(self._indices).indices.T.tobytes(),
+            np.stack([block.failures.codes, block.cautions.codes]).tobytes(),
+            json.dumps([block.failures.known, block.cautions.known]),
+        )
+        return (*row, self._checksum(*row))
 
-    def _checksum(
-        self, number: int, indices: bytes, failure: str | None, cautions: str | None
-    ) -> bytes:
-        text = f"{self.ledger.token} {number} {failure!r} {cautions!r} {indices!r}"
-        return sha256(text.encode()).digest()
+    def _checksum(self, first: int, ends: bytes, indices: bytes, codes: bytes, texts: str) -> bytes:
+        sizes = [len(part) for part in (ends, indices, codes)]
+        found = sha256(f"{self.ledger.token} {first} {sizes} {texts!r}".encode())
+        for part in (ends, indices, codes):
+            found.update(part)
+        return found.digest()
 
     def _remove_database(self) -> None:
         if self._path.exists():
@@ -203,9 +246,8 @@ def _make_database(path: Path, token: str) -> None:
         database.execute("INSERT INTO study VALUES (?)", (token,))
         # Indices are stored as bytes, so that they are read back bit for bit.
         database.execute(
-            "CREATE TABLE outcomes "
-            "(number INTEGER PRIMARY KEY, indices BLOB, failure TEXT, cautions TEXT, "
-            "checksum BLOB)"
+            "CREATE TABLE blocks (first INTEGER PRIMARY KEY, ends BLOB, indices BLOB, codes BLOB, "
+            "texts TEXT, checksum BLOB)"
         )
 
 
@@ -306,17 +348,16 @@ def _schema(arrow: Any, space: Space, indices: Sequence[str]) -> Any:
     )
 
 
-def _batch(arrow: Any, schema: Any, space: Space, rows: Sequence[_Row]) -> Any:
-    numbers, indices, failures, cautions = zip(*rows, strict=True)
-    scenarios, chosen = zip(*map(space.chosen, numbers), strict=True)
-    values = np.frombuffer(b"".join(indices)).reshape(len(rows), -1)
+def _batch(arrow: Any, schema: Any, space: Space, part: Outcomes) -> Any:
+    points = space.points(part.numbers)
+    scenarios = [case.scenario for case in points.cases]
     columns = [
-        numbers,
-        *([scenarios] * space.has_scenarios),
-        *([run[name] for run in chosen] for name in space.columns),
-        *values.T,
-        failures,
-        cautions,
+        part.numbers,
+        *([_texts(arrow, Texts(points.case, scenarios))] * space.has_scenarios),
+        *(points.values[name] for name in space.columns),
+        *part.indices.T,
+        _texts(arrow, part.failures),
+        _texts(arrow, part.cautions),
     ]
     arrays = [
         # Missing values become null.
@@ -324,6 +365,10 @@ def _batch(arrow: Any, schema: Any, space: Space, rows: Sequence[_Row]) -> Any:
         for column, field in zip(columns, schema, strict=True)
     ]
     return arrow.record_batch(arrays, schema=schema)
+
+
+def _texts(arrow: Any, texts: Texts) -> Any:
+    return arrow.array(texts.known, arrow.string()).take(arrow.array(texts.codes))
 
 
 # Reading
@@ -346,9 +391,9 @@ def read_study_record(folder: Path) -> dict[str, Any]:
 class StudyResult(Mapping[str, np.ndarray]):
     """The runs of a finished study, by column.
 
-    `result["plant.eta0.z"]` is a column as a numpy array; an unknown name is a KeyError with a
-    suggestion. A missing value of a run is nan. `result["failure"]` and `result["caution"]` are
-    None for a run without any.
+    `result["plant.eta0.z"]` is a column as a numpy array, read each time that it is asked for; an
+    unknown name is a KeyError with a suggestion. A missing value of a run is nan.
+    `result["failure"]` and `result["caution"]` are None for a run without any.
 
     Attributes:
         folder: the folder of the study.
@@ -369,16 +414,30 @@ class StudyResult(Mapping[str, np.ndarray]):
             if is_changed(path):
                 raise InputError(f"{path}: damaged, or changed since the study wrote it")
 
-    @cached_property
-    def _table(self) -> Any:
+    def _read(self, read: Callable[[Any], Any]) -> Any:
+        """Return what a function reads in the table.
+
+        Raises:
+            InputError: the table cannot be read.
+
+        """
         path = self.folder / STUDY_TABLE
         try:
-            table = import_module("pyarrow.parquet").read_table(locate(path))
+            with import_module("pyarrow.parquet").ParquetFile(locate(path)) as table:
+                return read(table)
         except (OSError, ValueError) as error:
             raise InputError(f"{path}: not the table of a study: {reason(error)}") from error
-        if table.num_rows != (n := self.record.get("runs")):
-            raise InputError(f"{path}: holds {table.num_rows} runs of {n}")
-        return table
+
+    @cached_property
+    def _described(self) -> tuple[int, Sequence[str]]:
+        """The number of runs, and the names of columns."""
+        n, names = self._read(lambda table: (table.metadata.num_rows, table.schema_arrow.names))
+        if n != (stated := self.record.get("runs")):
+            raise InputError(f"{self.folder / STUDY_TABLE}: holds {n} runs of {stated}")
+        return n, names
+
+    def _column(self, name: str) -> Any:
+        return self._read(lambda table: table.read([name]))[name]
 
     @cached_property
     def record(self) -> dict[str, Any]:
@@ -388,26 +447,33 @@ class StudyResult(Mapping[str, np.ndarray]):
     @property
     def runs(self) -> int:
         """Number of runs."""
-        return int(self._table.num_rows)
+        return self._described[0]
 
     @property
     def failed(self) -> int:
         """Number of failed runs."""
-        return int(self.runs - self._table[FAILURE].null_count)
+        return int(self.runs - self._column(FAILURE).null_count)
 
     @property
     def cautions(self) -> dict[str, int]:
         """Number of runs with each kind of caution."""
-        values = self.get(CAUTION, ())
-        return dict(Counter(kind for text in values if text for kind in text.split(", ")))
+        found = Counter[str]()
+        for each in self._column(CAUTION).value_counts().to_pylist() if CAUTION in self else ():
+            for kind in filter(None, (each["values"] or "").split(", ")):
+                found[kind] += each["counts"]
+        return dict(found)
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the columns."""
-        return iter(self._table.column_names)
+        return iter(self._described[1])
 
     def __len__(self) -> int:
         """Return the number of columns."""
-        return int(self._table.num_columns)
+        return len(self._described[1])
+
+    def __contains__(self, column: object) -> bool:
+        """Return True for the name of a column."""
+        return column in self._described[1]
 
     def __repr__(self) -> str:
         """Return one line."""
@@ -420,10 +486,9 @@ class StudyResult(Mapping[str, np.ndarray]):
             KeyError: there is no such column; the message has a suggestion.
 
         """
-        names = self._table.column_names
-        if column not in names:
-            raise KeyError(f"no column {column!r}{did_you_mean(str(column), names)}")
-        values: np.ndarray = self._table[column].to_numpy()
+        if column not in self:
+            raise KeyError(f"no column {column!r}{did_you_mean(str(column), [*self])}")
+        values: np.ndarray = self._column(column).to_numpy()
         return values
 
     def to_dataframe(self) -> pd.DataFrame:
@@ -435,5 +500,5 @@ class StudyResult(Mapping[str, np.ndarray]):
         """
         if find_spec("pandas") is None:
             raise ImportError("to_dataframe needs pandas: pip install pandas")
-        frame: pd.DataFrame = self._table.to_pandas().set_index(RUN)
+        frame: pd.DataFrame = self._read(lambda table: table.read()).to_pandas().set_index(RUN)
         return frame

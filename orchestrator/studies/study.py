@@ -34,9 +34,9 @@ from orchestrator.runs.preparation import is_path
 from orchestrator.vehicle.indices import index_columns
 
 #: Engines that make runs; the first is the default.
-EngineName: TypeAlias = Literal["fmu", "batch"]
+EngineName: TypeAlias = Literal["fmu", "batch", "gpu"]
 ENGINES: tuple[EngineName, ...] = get_args(EngineName)
-FMU, BATCH = ENGINES
+FMU, BATCH, GPU = ENGINES
 
 #: Spacings of values between two ends.
 SPACINGS = LINEAR_SPACING, LOG_SPACING = "linear", "log"
@@ -123,9 +123,12 @@ class StopTime(NamedTuple):
     base: float
     per: Mapping[str, float]
 
-    def at(self, chosen: Mapping[str, Any]) -> float:
-        """Return the stop time of a run with some values."""
-        return self.base + sum(rate * float(chosen[name]) for name, rate in self.per.items())
+    def at(self, values: Mapping[str, np.ndarray], n: int) -> np.ndarray:
+        """Return the stop times of n runs with some values."""
+        terms = [(rate * values[name].astype(float)).tolist() for name, rate in self.per.items()]
+        # By Python, which may round sums otherwise than numpy.
+        sums = [*map(sum, zip(*terms, strict=True))] if terms else [0.0] * n
+        return self.base + np.array(sums, dtype=float)
 
 
 @dataclass(frozen=True)

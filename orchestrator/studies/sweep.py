@@ -14,6 +14,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from fmus.kinds import AUTO, KINDS, PYTHON, KindName
 from orchestrator.cosim import Plan, System
 from orchestrator.figures.study_values import FigureEntry, Values
@@ -21,6 +23,8 @@ from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import PACKAGES
 from orchestrator.machine.lazy import progress_bar
+from orchestrator.program.card import Cards
+from orchestrator.program.library import PROCESSOR, Runners
 from orchestrator.runs.bundle import current_fmus, settings_of
 from orchestrator.runs.preparation import Prepared, load_scenario
 from orchestrator.runs.request import FORCE, KIND, LOOP, option
@@ -28,7 +32,8 @@ from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import Scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.blocks import Blocks, local_threads, local_workers
-from orchestrator.studies.engine import Engine, FmuEngine, Outcome, Point
+from orchestrator.studies.columns import Numbers, Outcomes, Point, Points
+from orchestrator.studies.engine import Engine, FmuEngine
 from orchestrator.studies.own_functions import OwnFunction, own_functions
 from orchestrator.studies.own_indices import OwnIndex, own_indices, with_fields
 from orchestrator.studies.space import Space
@@ -37,6 +42,7 @@ from orchestrator.studies.study import (
     BATCH,
     ENGINES,
     FMU,
+    GPU,
     EngineName,
     Study,
     read_figures,
@@ -62,6 +68,9 @@ _TRIED = 10
 #: Seconds before a progress bar appears.
 _PATIENCE = 0.5
 
+#: Advice for a machine without a graphics card.
+_INSTEAD = f"--engine {BATCH} makes the same runs on all cores"
+
 #: Name of a study without a file.
 _NAMELESS = "study"
 
@@ -77,8 +86,8 @@ class Means:
 
     engine: EngineName | None = option(
         None,
-        "engine that makes the runs: fmu (the FMUs) or batch (the system as one program); both "
-        "give the same numbers; default: from the study",
+        "engine that makes the runs: fmu (the FMUs), batch (the system as one program; the same "
+        "numbers) or gpu (that program on graphics cards); default: from the study",
     )
     kind: KindName = option(AUTO, KIND)
     loop: Plan.Loop = option(Plan.LOOPS[0], LOOP)
@@ -125,7 +134,7 @@ def sweep(
         study: name of a ready study, path of a .toml file, or a dictionary with its entries.
         indices: your own by their names: functions of the result of a run, which return a number,
             or a list or dictionary of numbers; :meth:`.Result.metrics` tries them on one result.
-        engine: engine that makes the runs, `fmu` or `batch`; None: the study's own.
+        engine: engine that makes the runs, `fmu`, `batch` or `gpu`; None: the study's own.
         kind: kind of the bundle's FMUs: `python`, `native`, or `auto`: the kind with which the
             study began, else native where available.
         loop: loop that makes their steps: `python`, `compiled` or `auto`.
@@ -264,6 +273,11 @@ def prepare_study(study: Study, means: Means, functions: Sequence[OwnFunction] =
         engine = _engine(means.engine or study.engine, space.prepared, means, own)
     if functions:
         findings.refuse()
+        if isinstance(engine, BatchEngine) and engine.runners is not PROCESSOR:
+            raise InputError(
+                f"indices that are functions need rows, which engine {GPU!r} does not keep; use "
+                f"--engine {BATCH}"
+            )
         engine.functions = with_columns(functions, space, own, engine, means)
         space.indices += tuple(chain(*(function.columns for function in engine.functions)))
     with findings.collecting():
@@ -292,14 +306,13 @@ def with_columns(
     names = tuple(f"index {function.name}: " for function in functions)
     workers = 1 if means.scheduler is None else None
     for number in range(min(_TRIED, len(space))):
+        points = [space.points(np.array([number]))]
         # As all others are made, since an FMU may end its process.
-        with making_runs(
-            engine, [space[number]], scheduler=means.scheduler, workers=workers
-        ) as blocks:
-            [outcome] = chain(*blocks)
-        failure = outcome.failure
+        with making_runs(engine, points, scheduler=means.scheduler, workers=workers) as blocks:
+            [outcomes] = blocks
+        [failure] = outcomes.failures.each()
         if failure is None:
-            known = [function.with_columns(outcome.indices) for function in functions]
+            known = [function.with_columns(outcomes.columns) for function in functions]
             columns = [*chain(*(function.columns for function in known))]
             taken = {
                 *space.columns,
@@ -342,11 +355,11 @@ def _check_engine(name: str, prepared: Mapping[str, Prepared]) -> None:
     for scenario, run in prepared.items():
         if run.input_tables:
             raise InputError(f"{scenario}: has a table of inputs, which studies do not support")
-        if name == BATCH and run.events:
-            raise InputError(f"{scenario}: has events, which engine {BATCH!r} does not support")
-        if name == BATCH and run.experiment.coupling == "linear":
+        if name != FMU and run.events:
+            raise InputError(f"{scenario}: has events, which engine {name!r} does not support")
+        if name != FMU and run.experiment.coupling == "linear":
             raise InputError(
-                f"{scenario}: coupling linear goes back in time, which engine {BATCH!r} cannot; "
+                f"{scenario}: coupling linear goes back in time, which engine {name!r} cannot; "
                 f"use --engine {FMU}"
             )
 
@@ -357,11 +370,13 @@ def _engine(
     _check_engine(name, prepared)
     if name == FMU:
         return FmuEngine(prepared, means.loop, own)
-    engine = BatchEngine(_systems(prepared), own)
+    runners: Runners = Cards(_INSTEAD) if name == GPU else PROCESSOR
+    engine, is_here = BatchEngine(_systems(prepared), own, runners=runners), means.scheduler is None
     for scenario, run in prepared.items():
         experiment = run.experiment
         engine.prepare(
-            Point(0, scenario, {}, experiment.stop_time, experiment.step, experiment.order)
+            Point(0, scenario, {}, experiment.stop_time, experiment.step, experiment.order),
+            is_here or name == BATCH,
         )
     return engine
 
@@ -392,6 +407,9 @@ def _record(study: Study, ready: Ready, command: Sequence[str]) -> dict[str, Any
     stated = asdict(study)
     own = {file.name: file.digest for file in ready.own}
     own |= {function.name: function.digest for function in ready.engine.functions}
+    engine, cards = ready.engine, list[str]()
+    if isinstance(engine, BatchEngine) and ready.means.scheduler is None:
+        cards = [*engine.runners.names]
     return {
         "study": study.name,
         "title": study.title,
@@ -411,17 +429,18 @@ def _record(study: Study, ready: Ready, command: Sequence[str]) -> dict[str, Any
         "versions": {"python": sys.version.split()[0]}
         | {package: version(package) for package in _RECORDED},
         "platform": platform.platform(),
+        **({"cards": cards} if cards else {}),
     }
 
 
 @contextmanager
 def making_runs(
     engine: Engine,
-    points: Iterable[Point],
+    points: Iterable[Points],
     *,
     scheduler: str | None = None,
     workers: int | None = None,
-) -> Iterator[Iterator[list[Outcome]]]:
+) -> Iterator[Iterator[Outcomes]]:
     """Yield an iterator over the outcomes of runs, block by block as they are done.
 
     Runs are taken from their iterator when they are needed. Each has one outcome; that of a run
@@ -429,7 +448,7 @@ def making_runs(
 
     Args:
         engine: that makes the runs.
-        points: runs to make.
+        points: runs to make, some at a time.
         scheduler: address of a Dask scheduler; None for processes or threads of this machine.
         workers: number of them; None for one per core.
 
@@ -443,11 +462,11 @@ def making_runs(
 
         pool = cluster(scheduler, engine)
     elif isinstance(engine, BatchEngine):
-        pool = local_threads(workers, engine)
+        pool = local_threads(workers or engine.runners.threads, engine)
     else:
         pool = local_workers(workers, engine)
     with pool as started:
-        yield Blocks(started).outcomes(points)
+        yield Blocks(started, engine).outcomes(points)
 
 
 def _complete(
@@ -471,17 +490,15 @@ def _complete(
         delay=_PATIENCE,
         disable=None if name else True,
     ) as bar:
-        left: Iterable[int] = store.missing(len(space))
+        left = store.missing(len(space))
         for engine in engines:
-            points, refused = (space[number] for number in left), list[int]()
+            points, refused = map(space.points, left.blocks(engine.most_runs)), Numbers()
             outcomes = making_runs(engine, points, scheduler=means.scheduler, workers=means.workers)
             with outcomes as blocks:
                 for block in blocks:
-                    done = [outcome for outcome in block if outcome.failure != REFUSED]
-                    refused += [outcome.number for outcome in block if outcome.failure == REFUSED]
-                    store.add(done)
-                    bar.update(len(done))
-            if not refused:
-                break
-            left = sorted(refused)
-    store.publish(space)
+                    is_refused = block.failures.has(REFUSED)
+                    refused.add(Numbers.of(block.numbers[is_refused]))
+                    store.add(block[~is_refused])
+                    bar.update(len(block) - int(is_refused.sum()))
+            left = refused
+        store.publish(space)

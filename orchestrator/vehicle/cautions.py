@@ -112,6 +112,10 @@ class Caution(NamedTuple):
     text: str
 
 
+#: Parameters of a controller from which warnings before a run follow.
+OBSERVER = ("k_d", "lambda", "h_max", "observer")
+
+
 def values_of(system: System) -> ValueOf:
     """Return a function that returns the values of the parameters of a system."""
 
@@ -124,10 +128,10 @@ def values_of(system: System) -> ValueOf:
 
 def observer_of(value: ValueOf, controller: str = STANDARD.controller) -> Inputs | None:
     """Return the parameters of a controller's observer, or None."""
-    numbers = [value(f"{controller}.{name}") for name in ("k_d", "lambda", "h_max")]
+    *numbers, form_of = (value(f"{controller}.{name}") for name in OBSERVER)
     if None in numbers:
         return None
-    form = Form.EXACT if value(f"{controller}.observer") in ("exact", Form.EXACT) else Form.EULER
+    form = Form.EXACT if form_of in ("exact", Form.EXACT) else Form.EULER
     k_d, lambda_, h_max = (float(number or 0.0) for number in numbers)
     return Inputs(k_d, lambda_, h_max, form)
 

@@ -21,6 +21,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, redirect_stderr, redirect_stdout
 from importlib.util import find_spec
 from io import StringIO
+from itertools import chain
 from math import modf
 from pathlib import Path
 from shutil import copytree, rmtree
@@ -43,7 +44,8 @@ from orchestrator.paper.report import Section
 from orchestrator.runs import bundle
 from orchestrator.runs.bundle import MANIFEST, current_fmus
 from orchestrator.runs.folder import LEDGER
-from orchestrator.studies.engine import Engine, Outcome, Point
+from orchestrator.studies.columns import Outcomes, Points
+from orchestrator.studies.engine import Engine
 from orchestrator.studies.store import Store
 from support.machine import contents, ended, forked
 from support.runs import InThisProcess
@@ -188,9 +190,9 @@ def quick(here: Path) -> Iterator[None]:
 
     @contextmanager
     def making(
-        engine: Engine, points: Iterable[Point], **_: object
-    ) -> Iterator[list[list[Outcome]]]:
-        yield [list(engine.outcomes([point])) for point in points]
+        engine: Engine, points: Iterable[Points], **_: object
+    ) -> Iterator[Iterable[Outcomes]]:
+        yield chain(*map(engine.outcomes, points))
 
     with ExitStack() as stack:
         for what, name, instead in (

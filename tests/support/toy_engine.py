@@ -5,10 +5,11 @@ from __future__ import annotations
 import os
 import signal
 import time
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import islice
 from typing import Any, NamedTuple
 
-from orchestrator.studies.engine import Outcome, Point
+from orchestrator.studies.columns import Outcome, Outcomes, Point, Points
 
 
 class Toy(NamedTuple):
@@ -20,8 +21,10 @@ class Toy(NamedTuple):
     """
 
     seconds: float = 0.0
+    least_runs: int = 1
+    most_runs: int = 10_000
 
-    def outcomes(self, points: Sequence[Point]) -> Iterator[Outcome]:
+    def outcomes(self, points: Points) -> Iterator[Outcomes]:
         for point in points:
             time.sleep(point.parameters.get("toy.seconds", self.seconds))
             if point.parameters.get("toy.talks"):
@@ -29,7 +32,7 @@ class Toy(NamedTuple):
                 os.write(2, b"out of a run\n")
             if point.parameters.get("toy.fatal"):
                 os.kill(os.getpid(), signal.SIGKILL)
-            yield outcome(point, os.getpid())
+            yield Outcomes.of([outcome(point, os.getpid())])
 
 
 def outcome(point: Point, process: int = 0) -> Outcome:
@@ -42,7 +45,14 @@ def run(number: int, parameters: Mapping[str, Any] = {}) -> Point:
     return Point(number, "toy", {"toy.x": 0.1 * number, **parameters}, 1.0, 0.02)
 
 
-def numbers_and_squares(blocks: Iterable[Sequence[Outcome]]) -> list[tuple[int, Any]]:
+def many(points: Iterable[Point], n: int = 8) -> Iterator[Points]:
+    """Runs, some at a time."""
+    every = iter(points)
+    while some := [*islice(every, n)]:
+        yield Points.of(some)
+
+
+def numbers_and_squares(blocks: Iterable[Iterable[Outcome]]) -> list[tuple[int, Any]]:
     """Outcomes of runs, in their order."""
     return sorted((made.number, made.indices.get("square")) for block in blocks for made in block)
 

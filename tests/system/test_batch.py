@@ -23,7 +23,8 @@ from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import Prepared, load, load_scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
-from orchestrator.studies.engine import FmuEngine, Point
+from orchestrator.studies.columns import Point
+from orchestrator.studies.engine import FmuEngine, outcomes_of
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import read_study, ready_studies
@@ -84,7 +85,7 @@ def test_runs_of_studies_equal_the_fmus(name):
     """All indices are equal; the FMUs report why a run fails."""
     runs = sampled(name)
     batch, fmus = engines(*read_study(name).scenario)
-    for by_batch, by_fmus in zip(batch.outcomes(runs), fmus.outcomes(runs), strict=True):
+    for by_batch, by_fmus in zip(outcomes_of(batch, runs), outcomes_of(fmus, runs), strict=True):
         if by_batch.failure == REFUSED:
             assert by_fmus.failure and not by_batch.indices
         else:
@@ -107,7 +108,7 @@ def compare_with_fmus(name: str, point: Point, own: tuple[OwnIndex, ...] = ()) -
     rows = np.column_stack([expected.time, expected.group(*table.columns)])
     different = np.argwhere(bits(table.rows) != bits(rows))
     assert not different.size, ("time", *table.columns)[different[0][1]]
-    [by_batch], [by_fmus] = batch.outcomes([point]), fmus.outcomes([point])
+    [by_batch], [by_fmus] = outcomes_of(batch, [point]), outcomes_of(fmus, [point])
     assert by_batch == by_fmus and by_batch.indices
 
 
@@ -142,7 +143,7 @@ def test_fleets_equal_the_fmus(name, order):
     values = {"auv*.plant.noise.std": 0.01, "auv2.plant.m11": 26.0, "auv3.controller.K1": (9, 9, 8)}
     point = Point(0, name, values, 2.01, 0.02, order)
     compare_with_fmus(name, point)
-    [outcome] = engines(name)[0].outcomes([point])
+    [outcome] = outcomes_of(engines(name)[0], [point])
     assert outcome.indices["smallest_distance"] > 0.0
 
 
@@ -209,7 +210,7 @@ MISTAKES: list[tuple[str, dict[str, Any]]] = [
 def test_the_engine_refuses_the_same_as_the_fmus(mistake, order):
     name, values = mistake
     point = Point(5, name, values, 3.0, 0.02, order)
-    [[by_batch], [by_fmus]] = (engine.outcomes([point]) for engine in engines(name))
+    [[by_batch], [by_fmus]] = (outcomes_of(engine, [point]) for engine in engines(name))
     assert by_fmus.failure
     assert by_batch == (5, {}, REFUSED, None)
     with pytest.raises(InputError):
@@ -253,7 +254,9 @@ def test_values_that_would_make_a_loop_endless_are_refused(workplace):
     path = str(Path("own.toml").resolve())
     # The reference comes beyond x = 1.1 m after 5.4 s.
     point = Point(0, path, {"scaled.k": 6e307}, 20.0, 0.02, "jacobi")
-    assert [*BatchEngine({path: load(path, KIND)}).outcomes([point])] == [(0, {}, REFUSED, None)]
+    assert [*outcomes_of(BatchEngine({path: load(path, KIND)}), [point])] == [
+        (0, {}, REFUSED, None)
+    ]
 
 
 def test_runs_that_are_refused_have_the_words_of_the_fmus(tmp_path):
@@ -300,7 +303,7 @@ def test_a_users_index_is_the_same_in_both_engines(name):
     own = (OwnIndex("largest_depth", Path(largest_depth.__file__).read_bytes()),)
     run = Point(0, name, {}, 2.01, 0.02)
     compare_with_fmus(name, run, own)
-    [outcome] = engines(name, own=own)[0].outcomes([run])
+    [outcome] = outcomes_of(engines(name, own=own)[0], [run])
     assert any(key.endswith("largest_depth") for key in outcome.indices)
 
 
@@ -310,19 +313,19 @@ def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
     run = Point(0, "fig4", {}, 0.5, 0.02)
     batch.prepare(run)
     copies = [pickle.loads(pickle.dumps(batch))]
-    [outcome] = batch.outcomes([run])
+    [outcome] = outcomes_of(batch, [run])
     sent = pickle.dumps(batch)
     assert len(sent) < 2_000_000
     copies += [pickle.loads(sent), pickle.loads(pickle.dumps(pickle.loads(sent)))]
     for copy in copies:
         assert copy.digest == batch.digest
-        assert list(copy.outcomes([run])) == [outcome]
+        assert list(outcomes_of(copy, [run])) == [outcome]
 
 
 def test_threads_have_noise_of_their_own():
     batch, _ = engines("fig4")
     runs = [Point(i, "fig4", {"plant.noise.seed": i}, 2.0, 0.02) for i in range(12)]
     with ThreadPoolExecutor(4) as pool:
-        side_by_side = list(pool.map(lambda run: next(batch.outcomes([run])), runs))
-    assert side_by_side == list(batch.outcomes(runs))
+        side_by_side = list(pool.map(lambda run: next(outcomes_of(batch, [run])), runs))
+    assert side_by_side == list(outcomes_of(batch, runs))
     assert len({outcome.indices["late_error"] for outcome in side_by_side}) == len(runs)

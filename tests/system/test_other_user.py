@@ -21,7 +21,7 @@ from orchestrator.runs.folder import LEDGER, Ledger, Taken, is_changed, locate
 from orchestrator.studies.sweep import making_runs
 from support.machine import called
 from support.texts import mentions
-from support.toy_engine import Toy, outcome, run
+from support.toy_engine import Toy, many, outcome, run
 
 pytestmark = [
     pytest.mark.slow,
@@ -159,7 +159,7 @@ def test_a_ledger_of_another_user_is_ignored(open_folder, other):
 def test_a_sweep_cannot_be_reached(other):
     psutil = pytest.importorskip("psutil", reason="needs the extra `studies`")
     runs = [run(number) for number in range(400)]
-    with making_runs(Toy(0.001), iter(runs), workers=2) as blocks:
+    with making_runs(Toy(0.001), many(runs), workers=2) as blocks:
         made = list(next(blocks))
         this = psutil.Process()
         processes = [this, *this.children(recursive=True)]

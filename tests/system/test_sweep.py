@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
-from itertools import product
+from itertools import chain, product
 from pathlib import Path
 
 import numpy as np
@@ -83,7 +83,7 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
     result = sweep("mine.toml", kind="native")
     runs = read_study("mine.toml")
     space = Space(runs, {name: load_scenario(name, "native") for name in runs.scenario})
-    outcomes = [*FmuEngine(space.prepared).outcomes([space[i] for i in range(len(space))])]
+    outcomes = [*chain(*FmuEngine(space.prepared).outcomes(space.points(np.arange(len(space)))))]
     assert list(result["run"]) == list(range(len(outcomes)))
     assert list(result["failure"]) == [outcome.failure for outcome in outcomes]
     for name in index_columns():

@@ -15,12 +15,12 @@ from orchestrator.machine import workers
 from orchestrator.studies import blocks as blocks_module
 from orchestrator.studies.blocks import FATAL
 from orchestrator.studies.sweep import making_runs
-from support.toy_engine import Toy, expected, numbers_and_squares, run
+from support.toy_engine import Toy, expected, many, numbers_and_squares, run
 
 
 def test_every_run_is_made_once_by_processes_that_stay_silent(capfd):
     runs = [run(number, {"toy.talks": True}) for number in range(1000)]
-    with making_runs(Toy(), iter(runs), workers=2) as blocks:
+    with making_runs(Toy(), many(runs), workers=2) as blocks:
         assert numbers_and_squares(blocks) == expected(runs)
     assert capfd.readouterr() == ("", "")
 
@@ -29,7 +29,7 @@ def test_every_run_is_made_once_by_processes_that_stay_silent(capfd):
 def test_runs_are_taken_as_they_are_needed():
     """A study of any number of runs has a bounded number of them under way."""
     taken = count()
-    with making_runs(Toy(0.2), (run(next(taken)) for _ in count()), workers=2) as blocks:
+    with making_runs(Toy(0.2), many(run(next(taken)) for _ in count()), workers=2) as blocks:
         next(blocks)
         assert next(taken) < 20
 
@@ -39,7 +39,7 @@ def test_runs_that_take_longer_than_those_before_come_in_smaller_blocks(monkeypa
     monkeypatch.setattr(blocks_module, "_SECONDS", 0.2)
     slow, longest = 0.05, 0.4
     runs = [run(number, {"toy.seconds": slow * (number >= 300)}) for number in range(360)]
-    with making_runs(Toy(), runs, workers=2) as blocks:
+    with making_runs(Toy(), many(runs, len(runs)), workers=2) as blocks:
         made = list(blocks)
     assert numbers_and_squares(made) == expected(runs)
     for block in made:
@@ -49,16 +49,16 @@ def test_runs_that_take_longer_than_those_before_come_in_smaller_blocks(monkeypa
 @pytest.mark.slow
 def test_a_worker_that_is_killed_costs_no_run():
     runs = [run(number) for number in range(200)]
-    with making_runs(Toy(0.02), runs, workers=2) as blocks:
+    with making_runs(Toy(0.02), many(runs), workers=2) as blocks:
         first = next(blocks)
-        os.kill(int(first[0].indices["process"]), signal.SIGKILL)
+        os.kill(int(next(iter(first)).indices["process"]), signal.SIGKILL)
         assert numbers_and_squares([first, *blocks]) == expected(runs)
 
 
 @pytest.mark.slow
 def test_a_run_that_ends_every_process_is_the_only_one_that_fails():
     runs = [run(number, {"toy.fatal": number == 17}) for number in range(40)]
-    with making_runs(Toy(), runs, workers=2) as blocks:
+    with making_runs(Toy(), many(runs), workers=2) as blocks:
         made = {made.number: made for block in blocks for made in block}
     assert sorted(made) == [run.number for run in runs]
     assert [n for n, made in made.items() if made.failure] == [17]
@@ -66,7 +66,7 @@ def test_a_run_that_ends_every_process_is_the_only_one_that_fails():
 
 
 def interrupted_after_the_first(runs):
-    with making_runs(Toy(), runs, workers=2) as blocks:
+    with making_runs(Toy(), many(runs), workers=2) as blocks:
         for _ in blocks:
             os.kill(os.getpid(), signal.SIGINT)
 
@@ -103,5 +103,5 @@ def test_temporary_folders_have_any_name(tmp_path, monkeypatch, name):
     folder.mkdir()
     monkeypatch.setattr(workers, "process_folder", lambda: folder)
     runs = [run(number) for number in range(20)]
-    with making_runs(Toy(), iter(runs), workers=1) as blocks:
+    with making_runs(Toy(), many(runs), workers=1) as blocks:
         assert numbers_and_squares(blocks) == expected(runs)

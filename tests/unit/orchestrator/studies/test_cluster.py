@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from support.toy_engine import Toy, expected, numbers_and_squares, run
+from support.toy_engine import Toy, expected, many, numbers_and_squares, run
 
 pytest.importorskip("distributed", reason="needs the extra `cluster`")
 
@@ -73,7 +73,7 @@ def test_a_scheduler_s_workers_come_and_go_while_a_study_is_under_way(scheduler,
     address, _ = scheduler
     runs = [run(number) for number in range(100)]
     with worker(address, tmp_path) as lost, ExitStack() as stack:
-        blocks = stack.enter_context(making_runs(Toy(0.05), iter(runs), scheduler=address))
+        blocks = stack.enter_context(making_runs(Toy(0.05), many(runs), scheduler=address))
         first = next(blocks)
         lost.kill()
         stack.enter_context(worker(address, tmp_path))
@@ -89,7 +89,7 @@ def test_a_scheduler_that_ends_is_reported(scheduler, tmp_path):
     with (
         gives_up_after(5.0),
         worker(address, tmp_path),
-        making_runs(Toy(0.05), map(run, count()), scheduler=address) as blocks,
+        making_runs(Toy(0.05), many(map(run, count())), scheduler=address) as blocks,
     ):
         next(blocks)
         process.kill()

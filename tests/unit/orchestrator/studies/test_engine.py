@@ -11,7 +11,8 @@ import threading
 import pytest
 
 from orchestrator import simulate
-from orchestrator.studies.engine import FmuEngine, Point
+from orchestrator.studies.columns import Point
+from orchestrator.studies.engine import FmuEngine, outcomes_of
 from support.runs import prepared
 
 CHANGES = {"plant.eta0.y": 3.0, "controller.eps_t": 2.0, "plant.noise.seed": 7}
@@ -25,7 +26,7 @@ def engine():
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
 @pytest.mark.parametrize("scenario", ["fig5", "fig5-pd"])
 def test_an_outcome_equals_the_run_by_simulate(engine, scenario, order):
-    [outcome] = engine.outcomes([Point(3, scenario, CHANGES, 6.0, 0.015, order)])
+    [outcome] = outcomes_of(engine, [Point(3, scenario, CHANGES, 6.0, 0.015, order)])
     alone = simulate(
         scenario, CHANGES, stop_time=6.0, step=0.015, order=order, kind="native", loop="python"
     )
@@ -49,7 +50,7 @@ def test_failure_is_an_outcome_and_the_next_run_is_made(engine):
     stopped = Point(1, "fig5", {"plant.nu0.u": 1e60, "plant.nu0.r": 1e60}, 1.0, 0.02)
     no_time = Point(3, "fig5", {}, 0.0, 0.02)
     runs = [refused, stopped, fine, no_time, fine]
-    first, second, third, fourth, last = engine.outcomes(runs)
+    first, second, third, fourth, last = outcomes_of(engine, runs)
     assert [first.number, second.number, third.number, fourth.number] == [0, 1, 2, 3]
     assert "plant.ell = -1.0: must be at least" in first.failure
     assert second.failure.startswith("stopped at t = 0")
@@ -70,11 +71,11 @@ def test_fmus_travel_with_the_engine(tmp_path, native):
     shutil.rmtree(tmp_path)
     runs = [Point(0, "own", CHANGES, 1.0, 0.02)]
     arrived = pickle.loads(sent)
-    [outcome] = arrived.outcomes(runs)
+    [outcome] = outcomes_of(arrived, runs)
     assert outcome.failure is None
-    assert [outcome] == list(FmuEngine({"own": prepared("fig4")}).outcomes(runs))
+    assert [outcome] == list(outcomes_of(FmuEngine({"own": prepared("fig4")}), runs))
     # An engine that was unpickled can be pickled.
-    assert list(pickle.loads(pickle.dumps(arrived)).outcomes(runs)) == [outcome]
+    assert list(outcomes_of(pickle.loads(pickle.dumps(arrived)), runs)) == [outcome]
     assert arrived.digest == pickle.loads(sent).digest
 
 
@@ -82,5 +83,5 @@ def test_an_interrupt_is_not_a_failure(engine):
     timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
     timer.start()
     with pytest.raises(KeyboardInterrupt):
-        list(engine.outcomes([Point(i, "fig5", {}, 1e5, 0.02) for i in range(2)]))
+        list(outcomes_of(engine, [Point(i, "fig5", {}, 1e5, 0.02) for i in range(2)]))
     timer.join()

@@ -11,7 +11,8 @@ import pytest
 from orchestrator import simulate, sweep
 from orchestrator.figures.study_values import Values
 from orchestrator.machine.errors import InputError, Refused
-from orchestrator.studies.engine import Point
+from orchestrator.studies.columns import Point
+from orchestrator.studies.engine import outcomes_of
 from orchestrator.studies.own_indices import OwnIndex, read_own_index, with_fields
 from orchestrator.studies.study import read_study
 from orchestrator.studies.sweep import Means, prepare_study
@@ -113,7 +114,7 @@ def test_a_file_may_hold_several(tmp_path):
     assert ready.space.indices[-3:] == ("away.a", "away.b", "settling")
     assert ready.figures[0].show == ["away", "settling"]
     assert Values({}, units=ready.space.units).label("away") == "away [s]"
-    [outcome] = ready.engine.outcomes([Point(0, "fig4", {}, 0.1, 0.02)])
+    [outcome] = outcomes_of(ready.engine, [Point(0, "fig4", {}, 0.1, 0.02)])
     assert outcome.indices["away.b"] == 1.0
 
 
@@ -121,10 +122,10 @@ def test_it_is_pickled_with_the_engine(tmp_path):
     file, index = study(tmp_path)
     engine = prepare_study(read_study(str(file)), Means(kind="native")).engine
     runs = [Point(0, "fig4", {"plant.eta0.z": 3.0}, 1.0, 0.02)]
-    [here] = engine.outcomes(runs)
+    [here] = outcomes_of(engine, runs)
     sent = pickle.dumps(engine)
     index.unlink()
-    assert list(pickle.loads(sent).outcomes(runs)) == [here]
+    assert list(outcomes_of(pickle.loads(sent), runs)) == [here]
     assert here.indices["settling"] == 1.0
 
 
@@ -134,7 +135,7 @@ def test_each_vehicle_has_its_index(tmp_path):
     )
     ready = prepare_study(read_study(str(file)), Means(kind="native"))
     assert ready.figures[0].show == [f"auv{i}.settling" for i in (1, 2, 3)]
-    [outcome] = ready.engine.outcomes([ready.space[0]])
+    [outcome] = outcomes_of(ready.engine, [ready.space[0]])
     assert outcome.failure is None
     assert {name for name in outcome.indices if "settling" in name} <= {*ready.figures[0].show}
 
@@ -142,7 +143,7 @@ def test_each_vehicle_has_its_index(tmp_path):
 def test_an_exception_of_an_index_is_the_failure_of_a_run(tmp_path):
     file, _ = study(tmp_path, SETTLING.replace("return State(t)", "return State(1.0 / (t - t))"))
     engine = prepare_study(read_study(str(file)), Means(kind="native")).engine
-    [outcome] = engine.outcomes([Point(0, "fig4", {"plant.eta0.z": 3.0}, 1.0, 0.02)])
+    [outcome] = outcomes_of(engine, [Point(0, "fig4", {"plant.eta0.z": 3.0}, 1.0, 0.02)])
     assert outcome.indices == {}
     why = "index settling: at t = 0 s: ZeroDivisionError: float division by zero"
     assert outcome.failure == why

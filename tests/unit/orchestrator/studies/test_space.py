@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import load_scenario
-from orchestrator.studies.engine import Point
+from orchestrator.studies.columns import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS, study_of
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 
 from orchestrator.machine.errors import InputError
-from orchestrator.studies.engine import Outcome
+from orchestrator.studies.columns import Case, Outcome, Outcomes, Points
 from orchestrator.studies.store import StudyResult, open_store, read_study_record
 from orchestrator.vehicle.indices import index_columns
 from support.machine import contents, eventually
@@ -35,12 +36,20 @@ class Toys:
     def __len__(self):
         return self.runs
 
-    def chosen(self, number: int):
-        return f"scenario {number % 2}", {"toy.x": 0.1 * number, "toy.name": str(number)}
+    def points(self, numbers: np.ndarray) -> Points:
+        names = np.array([str(number) for number in numbers], dtype=object)
+        values = {"toy.x": 0.1 * numbers, "toy.name": names}
+        ones = np.ones(len(numbers))
+        cases = [Case("scenario 0", {}), Case("scenario 1", {})]
+        return Points(numbers, cases, numbers % 2, values, ones, ones)
 
 
 def outcome(number: int) -> Outcome:
     return Outcome(number, {name: 0.3 * number + i for i, name in enumerate(index_columns())})
+
+
+def outcomes(*each: Outcome) -> Outcomes:
+    return Outcomes.of(each)
 
 
 def check_refused(words: str, folder: Path, record: Mapping[str, Any] = RECORD):
@@ -50,16 +59,18 @@ def check_refused(words: str, folder: Path, record: Mapping[str, Any] = RECORD):
 
 def test_outcomes_are_kept_and_the_others_are_missing(tmp_path):
     with open_store(tmp_path / "new", RECORD, index_columns()) as first:
-        assert list(first.missing(6)) == [0, 1, 2, 3, 4, 5]
-        first.add([outcome(4), outcome(1)])
+        assert missing(first, 6) == [[0, 1], [2, 3], [4, 5]]
+        first.add(outcomes(outcome(4), outcome(1)))
     with open_store(tmp_path / "new", RECORD, index_columns()) as second:
         assert len(second) == 2
-        assert list(second.missing(6)) == [0, 2, 3, 5]
-        missing = second.missing(6)
-        next(missing)
+        assert missing(second, 6) == [[0, 2], [3, 5]]
+        blocks = second.missing(6).blocks(1)
+        next(blocks)
         # New outcomes do not change an iteration.
-        second.add([outcome(2), outcome(4)])
-        assert list(missing) == [2, 3, 5]
+        second.add(outcomes(outcome(2), outcome(4)))
+        assert [*chain(*blocks)] == [2, 3, 5]
+        assert len(second) == 3
+        second.add(outcomes(outcome(4)))
         assert len(second) == 3
 
 
@@ -67,10 +78,9 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     odd = dict.fromkeys(index_columns(), 0.1 + 0.2) | {"late_error": -0.0, "largest_speed": np.inf}
     del odd["time_to_reach"]
     stopped = Outcome(1, {}, "stopped at t = 1 s: it would", "chattering")
-    outcomes = [outcome(3), stopped, outcome(2)]
     with open_store(tmp_path, RECORD, index_columns()) as unfinished:
-        unfinished.add(outcomes)
-        unfinished.add([Outcome(0, odd)])
+        unfinished.add(outcomes(outcome(3), stopped, outcome(2)))
+        unfinished.add(outcomes(Outcome(0, odd)))
         unfinished.publish(Toys(4))
     assert contents(tmp_path).keys() == {"runs.parquet", "study.json"}
     table = parquet.read_table(tmp_path / "runs.parquet")
@@ -81,7 +91,8 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     assert [row["failure"] for row in rows] == [None, "stopped at t = 1 s: it would", None, None]
     assert [row["caution"] for row in rows] == [None, "chattering", None, None]
     for number, row in enumerate(rows):
-        assert (row["scenario"], {k: row[k] for k in Toys(4).columns}) == Toys(4).chosen(number)
+        expected = (f"scenario {number % 2}", 0.1 * number, str(number))
+        assert (row["scenario"], row["toy.x"], row["toy.name"]) == expected
     assert rows[2] | outcome(2).indices == rows[2]
     assert all(rows[1][name] is None for name in index_columns())
     assert rows[0]["time_to_reach"] is None
@@ -92,7 +103,7 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
 def test_result_gives_columns_and_suggests_names(tmp_path):
     with open_store(tmp_path, RECORD | {"runs": 2}, index_columns()) as unfinished:
         wary = outcome(1)._replace(cautions="unstable observer, chattering")
-        unfinished.add([wary, Outcome(0, {}, "it would not", "chattering")])
+        unfinished.add(outcomes(wary, Outcome(0, {}, "it would not", "chattering")))
         unfinished.publish(Toys(2))
     result = StudyResult(tmp_path)
     assert (result.runs, result.failed) == (2, 1)
@@ -111,7 +122,7 @@ def test_result_gives_columns_and_suggests_names(tmp_path):
 
 def test_study_that_is_done_is_not_opened_again(tmp_path):
     with open_store(tmp_path, RECORD | {"runs": 1}, index_columns()) as unfinished:
-        unfinished.add([outcome(0)])
+        unfinished.add(outcomes(outcome(0)))
         unfinished.publish(Toys(1))
     with open_store(tmp_path, RECORD, index_columns()) as unfinished:
         assert unfinished.is_done
@@ -172,19 +183,24 @@ def test_a_damaged_database_and_a_file_as_folder_are_one_line(tmp_path):
     check_refused("cannot write into .*choose another place", tmp_path / "file")
 
 
+def missing(store, n: int) -> list[list[int]]:
+    return [block.tolist() for block in store.missing(n).blocks(2)]
+
+
 BLOCK = 50
 
 WRITER = f"""
 import sys
 from itertools import count
 from pathlib import Path
-from orchestrator.studies.engine import Outcome
+from orchestrator.studies.columns import Outcome, Outcomes
 from orchestrator.studies.store import open_store
 from orchestrator.vehicle.indices import index_columns
 
 with open_store(Path(sys.argv[1]), {RECORD!r}, index_columns()) as unfinished:
     for block in count(len(unfinished) // {BLOCK}):
-        unfinished.add([Outcome({BLOCK} * block + i, {{}}, str(i)) for i in range({BLOCK})])
+        runs = range({BLOCK} * block, {BLOCK} * (block + 1))
+        unfinished.add(Outcomes.of([Outcome(number, {{}}, str(number)) for number in runs]))
 """
 
 
@@ -202,4 +218,4 @@ def test_kill_loses_at_most_the_block_under_way(tmp_path):
             done = len(unfinished)
             # All of a block, or none.
             assert done % BLOCK == 0
-            assert list(unfinished.missing(done + 2)) == [done, done + 1]
+            assert missing(unfinished, done + 2) == [[done, done + 1]]

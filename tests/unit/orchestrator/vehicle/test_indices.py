@@ -209,7 +209,8 @@ def test_a_new_index_is_one_entry(monkeypatch, tmp_path):
     study = {"scenario": "fig4", "stop_time": 1.0, "vary": {"plant.nu0.w": [1.0]}}
     space = Space(study_of("own", study), {"fig4": load_scenario("fig4", "native")})
     with open_store(tmp_path, {"made_of": {}, "runs": 1}, space.indices) as kept:
-        kept.add(list(FmuEngine(space.prepared).outcomes([space[0]])))
+        [outcomes] = FmuEngine(space.prepared).outcomes(space.points(np.arange(1)))
+        kept.add(outcomes)
         kept.publish(space)
     made = StudyResult(tmp_path)
     assert made["largest_depth"].tolist() == [deepest]
