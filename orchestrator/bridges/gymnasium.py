@@ -246,8 +246,8 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
     environment whose episode has ended begins the next one in the following step.
 
     On a card, observations, rewards and flags are arrays of CuPy, which torch and jax take without
-    a copy (DLPack), and actions may be theirs. One generator draws the starts of all episodes there,
-    so the same seed gives other episodes than on the processor.
+    a copy (DLPack), and actions may be theirs. One generator draws the starts of all episodes,
+    so a seed gives other episodes than on the processor.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
