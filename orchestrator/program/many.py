@@ -311,7 +311,7 @@ def as_array(arrays: Any, values: Any) -> Any:
     if isinstance(values, arrays.ndarray):
         return values
     there = getattr(values, "__dlpack_device__", None)
-    if there is not None and there() == arrays.empty(0).__dlpack_device__():
+    if there is not None and there() == arrays.empty(1).__dlpack_device__():
         return arrays.from_dlpack(values)
     values = np.asarray(values)
     return arrays.asarray(values) if values.dtype.kind in "biuf" else values

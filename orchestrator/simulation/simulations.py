@@ -328,9 +328,13 @@ class Simulations:
 
     def _reason(self, values: np.ndarray) -> str:
         """Return the reason why parameters are refused."""
-        names = {str(name): values[i].item() for name, i in self._program.settables.items()}
+        types: Mapping[str, type] = {"Real": float, "Boolean": bool}
+        own = {
+            str(name): types.get(self._system.variable(name).family, int)(values[i])
+            for name, i in self._program.settables.items()
+        }
         try:
-            ProgramSession(self._prepared.with_parameters(names).plan)
+            ProgramSession(self._prepared.with_parameters(own).plan)
         except InputError as error:
             return str(error)
         return "a component refuses its parameters"
