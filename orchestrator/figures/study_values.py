@@ -96,6 +96,23 @@ VERDICTS: Mapping[str, tuple[str, Callable[[Columns], np.ndarray]]] = {
 }
 
 
+class _Some(Mapping[str, np.ndarray]):
+    """The columns of some runs, each of which is taken when it is asked for."""
+
+    def __init__(self, columns: Columns, rows: np.ndarray) -> None:
+        self._columns, self._chosen = columns, rows
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        column: np.ndarray = self._columns[name][self._chosen]
+        return column
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns)
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+
 @dataclass(frozen=True)
 class Values:
     """The values of some runs.
@@ -167,7 +184,7 @@ class Values:
         return self._rows(np.all(fitting, axis=0)) if fitting else self
 
     def _rows(self, rows: np.ndarray) -> Values:
-        return replace(self, columns={name: column[rows] for name, column in self.columns.items()})
+        return replace(self, columns=_Some(self.columns, rows))
 
     def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Values]]:
         """Yield the runs that agree in some columns, each part with a text that distinguishes it.

@@ -23,7 +23,7 @@ from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import Prepared, load, load_scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
-from orchestrator.studies.columns import Point
+from orchestrator.studies.columns import Case, Outcomes, Point, Points
 from orchestrator.studies.engine import FmuEngine, outcomes_of
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.studies.space import Space
@@ -320,6 +320,23 @@ def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
     for copy in copies:
         assert copy.digest == batch.digest
         assert list(outcomes_of(copy, [run])) == [outcome]
+
+
+def test_runs_as_columns_are_those_made_one_by_one():
+    """Also values of all types that a component refuses, and several cases and steps."""
+    values = {
+        "plant.m11": np.array([25.0, -1.0, np.inf, 26.0, 1e-9, 25.0]),
+        "plant.noise.seed": np.array([1, 2, 3, 2**31, 5, -(2**31)]),
+        "plant.roll": np.array([True, False, True, True, True, False]),
+        "controller.saturation": np.array(["tanh", *["algebraic"] * 4, "none"], dtype=object),
+    }
+    batch, ones = engines("fig4")[0], np.ones(6)
+    cases = [Case("fig4", {"controller.k_d": 90.0}, (*values,)), Case("fig4", {}, ("plant.m11",))]
+    numbers, case, step = np.arange(6), np.array([0, 0, 0, 0, 0, 1]), np.array([0.02, 0.01] * 3)
+    points = Points(numbers, cases, case, values, ones, step)
+    found = Outcomes.joined([*batch.outcomes(points)])
+    assert [*found] == [*outcomes_of(batch, points)]
+    assert [outcome.failure for outcome in found] == [None, *[REFUSED] * 4, None]
 
 
 def test_threads_have_noise_of_their_own():
