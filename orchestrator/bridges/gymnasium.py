@@ -277,7 +277,7 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
             batch_space(space, self.num_envs)
             for space in (self._task.observations, self._task.actions)
         )
-        #: One for each environment; on a card, which has very many, one for all.
+        #: One for each environment, but on a card one for all.
         self._draws_together = options.device not in PROCESSOR
         n_generators = 1 if self._draws_together else self.num_envs
         self._generators = [np.random.default_rng() for _ in range(n_generators)]
