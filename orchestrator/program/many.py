@@ -154,9 +154,9 @@ class ManyOnProcessor(Many):
         self._parts = [*pairwise(np.linspace(0, n, threads + 1).astype(int).tolist())]
 
     def view(self, ports: Sequence[PortName]) -> np.ndarray:
-        """Return a view of the values of some ports that cannot be written."""
+        """Return a view of the values of some ports that cannot be written, or a copy."""
         view: np.ndarray = super().view(ports)
-        view.flags.writeable = False
+        view.flags.writeable = view.base is None
         return view
 
     def _strided(self, first: Place, n: int, apart: int) -> np.ndarray:

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
-from itertools import cycle
+from itertools import chain, cycle
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -337,6 +337,19 @@ def test_runs_as_columns_are_those_made_one_by_one():
     found = Outcomes.joined([*batch.outcomes(points)])
     assert [*found] == [*outcomes_of(batch, points)]
     assert [outcome.failure for outcome in found] == [None, *[REFUSED] * 4, None]
+
+
+def test_a_column_may_be_for_several_vehicles():
+    values = {
+        "auv*.plant.noise.std": np.array([0.0, 0.01, 0.02]),
+        "auv2.plant.m11": 25.0 + np.arange(3),
+    }
+    case, ones = Case("formation-v", {"auv*.plant.m11": 24.0}, (*values,)), np.ones(3)
+    points = Points(np.arange(3), [case], np.zeros(3, dtype=int), values, 0.4 * ones, 0.02 * ones)
+    batch, _ = engines("formation-v")
+    found = [*chain(*batch.outcomes(points))]
+    assert found == [*outcomes_of(batch, points)]
+    assert len({outcome.indices["auv2.peak_command.u"] for outcome in found}) == 3
 
 
 def test_threads_have_noise_of_their_own():
