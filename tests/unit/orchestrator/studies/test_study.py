@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import tomllib
+from dataclasses import replace
+
 import pytest
 
 from orchestrator.machine.errors import InputError, Refused
@@ -66,6 +69,23 @@ def test_content_of_a_file(tmp_path):
     assert study.sample == Sample(5, ranges, "sobol", 0)
     assert study.figures == {"map": {"kind": "bands", "x": "plant.eta0.z", "show": "lost"}}
     assert study.varied == (*study.vary, *ranges)
+
+
+def test_points_are_those_of_the_sample_or_of_each_range():
+    study = study_of("mine", tomllib.loads(TEXT))
+    more = study.with_points(16)
+    assert (more.sample, more.vary) == (study.sample._replace(n=16), study.vary)
+    grid = replace(study, sample=None).with_points(2)
+    assert grid.vary == {
+        "plant.eta0.z": pytest.approx((1.0, 100.0)),
+        "controller.K1[1]": (10.0, 20.0),
+        "controller.saturation": ("tanh", "algebraic"),
+    }
+    with pytest.raises(InputError, match="at most 1,000,000,000"):
+        study.with_points(10**10)
+    lists = study_of("mine", {"scenario": "fig4", "vary": {"plant.ell": [0.3, 0.4]}})
+    with pytest.raises(InputError, match="--points 7: mine has neither a sample nor a range"):
+        lists.with_points(7)
 
 
 def test_quoted_and_dotted_keys_are_the_same():
