@@ -185,13 +185,10 @@ class Program:
         values = np.ascontiguousarray(values)
         indices = np.empty((len(values), self.source.n_indices))
         refused = np.zeros(len(values), dtype=bool)
+        given, found = (array.ctypes.data for array in (values, indices))
         for i, grid in enumerate(zip(*(column.tolist() for column in grids), strict=True)):
-            refused[i] = self._refuses(
-                values.ctypes.data + i * values.strides[0],
-                grid,
-                None,
-                indices.ctypes.data + i * indices.strides[0],
-            )
+            refused[i] = self._refuses(given, grid, None, found)
+            given, found = given + values.strides[0], found + indices.strides[0]
         indices[refused] = np.nan
         return indices, refused
 

@@ -40,7 +40,7 @@ from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import PROGRAM
 from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import Scenario
-from orchestrator.studies.columns import Case, Outcomes, Point, Points, Texts
+from orchestrator.studies.columns import Case, Outcomes, Point, Points, Rows, Texts
 from orchestrator.studies.engine import with_functions
 from orchestrator.studies.own_functions import OwnFunction
 from orchestrator.studies.own_indices import OwnIndex
@@ -460,16 +460,18 @@ class BatchEngine:
             values, refused = programs.values(compiled, case, points)
         except Refusal:
             return programs.refused(compiled, case, points)
-        rows = np.flatnonzero(~refused)
         if self.functions:
-            made = [programs.refused(compiled, case, points[refused])]
-            made += [
-                self._by_rows(programs, compiled, case, points[i : i + 1], values[i]) for i in rows
-            ]
-            order = np.argsort(np.concatenate([np.flatnonzero(refused), rows]))
-            return Outcomes.joined(made)[order]
+            return Outcomes.joined(
+                [
+                    programs.refused(compiled, case, points[i : i + 1])
+                    if refused[i]
+                    else self._by_rows(programs, compiled, case, points[i : i + 1], values[i])
+                    for i in range(len(points))
+                ]
+            )
         results = np.full((len(points), compiled.source.n_indices), np.nan)
-        if len(rows):
+        if not refused.all():
+            rows: Rows = ~refused if refused.any() else slice(None)
             grids = _grids(case, points[rows])
             results[rows], refused[rows] = compiled.program.runs(values[rows], grids)
         return programs.outcomes(compiled, case, points, results, refused)

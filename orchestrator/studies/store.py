@@ -49,8 +49,11 @@ _DATABASE = "unfinished.sqlite"
 #: Largest number of runs in a row of the database, and least number in a part of the table.
 _ROWS = 65_536
 
-#: Suffixes of SQLite's files, and length of the beginning of the database with the token [bytes].
-_ENDS, _PAGES = ("", "-wal", "-shm", "-journal"), 16_384
+#: Suffixes of SQLite's files.
+_ENDS = ("", "-wal", "-shm", "-journal")
+
+#: Size of a page of the database, the largest, for blocks of megabytes [bytes].
+_PAGE = 65_536
 
 #: Only this process opens the database, so it needs no shared memory, which network file systems
 #: lack. A block outlasts the process as soon as it is written, and a power cut soon afterwards.
@@ -241,7 +244,8 @@ class Store:
 
 def _make_database(path: Path, token: str) -> None:
     with closing(sqlite3.connect(path)) as database, database:
-        # The first table, so that the token is in the first pages.
+        database.execute(f"PRAGMA page_size = {_PAGE}")
+        # The first table, so that the token is in the second page.
         database.execute("CREATE TABLE study (token TEXT)")
         database.execute("INSERT INTO study VALUES (?)", (token,))
         # Indices are stored as bytes, so that they are read back bit for bit.
@@ -256,7 +260,7 @@ def _is_ours(path: Path, token: str) -> bool:
     if path.is_symlink() or not path.is_file():
         return False
     with path.open("rb") as file:
-        return token.encode() in file.read(_PAGES)
+        return token.encode() in file.read(2 * _PAGE)
 
 
 @contextmanager
@@ -436,8 +440,18 @@ class StudyResult(Mapping[str, np.ndarray]):
             raise InputError(f"{self.folder / STUDY_TABLE}: holds {n} runs of {stated}")
         return n, names
 
-    def _column(self, name: str) -> Any:
-        return self._read(lambda table: table.read([name]))[name]
+    def _counts(self, name: str) -> Counter[str | None]:
+        """Return how often each text is in a column, some of which is in memory at a time."""
+
+        def count(table: Any) -> Counter[str | None]:
+            counts = Counter[str | None]()
+            for batch in table.iter_batches(columns=[name]):
+                for each in batch.column(0).value_counts().to_pylist():
+                    counts[each["values"]] += each["counts"]
+            return counts
+
+        found: Counter[str | None] = self._read(count)
+        return found
 
     @cached_property
     def record(self) -> dict[str, Any]:
@@ -452,15 +466,14 @@ class StudyResult(Mapping[str, np.ndarray]):
     @property
     def failed(self) -> int:
         """Number of failed runs."""
-        return int(self.runs - self._column(FAILURE).null_count)
+        return self.runs - self._counts(FAILURE)[None]
 
     @property
     def cautions(self) -> dict[str, int]:
         """Number of runs with each kind of caution."""
         found = Counter[str]()
-        for each in self._column(CAUTION).value_counts().to_pylist() if CAUTION in self else ():
-            for kind in filter(None, (each["values"] or "").split(", ")):
-                found[kind] += each["counts"]
+        for text, n in (self._counts(CAUTION) if CAUTION in self else {}).items():
+            found.update(dict.fromkeys(filter(None, (text or "").split(", ")), n))
         return dict(found)
 
     def __iter__(self) -> Iterator[str]:
@@ -488,7 +501,7 @@ class StudyResult(Mapping[str, np.ndarray]):
         """
         if column not in self:
             raise KeyError(f"no column {column!r}{did_you_mean(str(column), [*self])}")
-        values: np.ndarray = self._column(column).to_numpy()
+        values: np.ndarray = self._read(lambda table: table.read([column]))[column].to_numpy()
         return values
 
     def to_dataframe(self) -> pd.DataFrame:

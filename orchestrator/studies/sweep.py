@@ -503,6 +503,8 @@ def _complete(
     ) as bar:
         left = store.missing(len(space))
         for engine in engines:
+            if not left:
+                break
             points, refused = map(space.points, left.blocks(engine.most_runs)), Numbers()
             outcomes = making_runs(engine, points, scheduler=means.scheduler, workers=means.workers)
             with outcomes as blocks:

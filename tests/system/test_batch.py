@@ -21,9 +21,10 @@ from orchestrator.commands.main import main
 from orchestrator.cosim import Order, PortName, System, write_ssp
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
+from orchestrator.program.library import Program
 from orchestrator.runs.preparation import Prepared, load, load_scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
-from orchestrator.studies.columns import Point
+from orchestrator.studies.columns import Case, Outcomes, Point, Points
 from orchestrator.studies.engine import FmuEngine, outcomes_of
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.studies.space import Space
@@ -320,6 +321,35 @@ def test_engine_that_has_travelled_makes_the_same_and_needs_no_fmus():
     for copy in copies:
         assert copy.digest == batch.digest
         assert list(outcomes_of(copy, [run])) == [outcome]
+
+
+def test_runs_as_columns_are_those_made_one_by_one():
+    """Also values of all types that a component refuses, and several cases and steps."""
+    values = {
+        "plant.m11": np.array([25.0, -1.0, np.inf, 26.0, 1e-9, 25.0]),
+        "plant.noise.seed": np.array([1, 2, 3, 2**31, 5, -(2**31)]),
+        "plant.roll": np.array([True, False, True, True, True, False]),
+        "controller.saturation": np.array(["tanh", *["algebraic"] * 4, "none"], dtype=object),
+    }
+    batch, ones = engines("fig4")[0], np.ones(6)
+    cases = [Case("fig4", {"controller.k_d": 90.0}, (*values,)), Case("fig4", {}, ("plant.m11",))]
+    numbers, case, step = np.arange(6), np.array([0, 0, 0, 0, 0, 1]), np.array([0.02, 0.01] * 3)
+    points = Points(numbers, cases, case, values, ones, step)
+    found = Outcomes.joined([*batch.outcomes(points)])
+    assert [*found] == [*outcomes_of(batch, points)]
+    assert [outcome.failure for outcome in found] == [None, *[REFUSED] * 4, None]
+
+
+def test_a_program_may_make_all_runs_of_a_block_at_once():
+    """As on a graphics card."""
+
+    class AtOnce(Program):
+        least_runs = most_runs = 1000
+
+    points = Points.of(Point(i, "fig4", {"plant.eta0.y": float(i)}, 0.1, 0.02) for i in range(40))
+    engine = BatchEngine(systems("fig4"), make=AtOnce)
+    [found] = engine.outcomes(points)
+    assert [*found] == [*outcomes_of(engines("fig4")[0], points)]
 
 
 def test_threads_have_noise_of_their_own():

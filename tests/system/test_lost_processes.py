@@ -13,6 +13,7 @@ from contextlib import closing, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import numpy as np
 import pytest
 
 psutil = pytest.importorskip("psutil", reason="needs the extra `studies`")
@@ -56,9 +57,12 @@ def rows(out):
                 shutil.copy(file, copy)
         with closing(sqlite3.connect(Path(copy, DATABASE))) as database:
             try:
-                return database.execute("SELECT count(*) FROM outcomes").fetchone()[0]
+                blocks = database.execute("SELECT ends FROM blocks").fetchall()
             except sqlite3.Error:
                 return 0
+    # First number, and first one that is not in it, of each range of a block.
+    ends = np.concatenate([np.frombuffer(block, dtype=np.int64) for (block,) in [(b"",), *blocks]])
+    return int((ends[1::2] - ends[::2]).sum())
 
 
 def in_the_middle(process, out):

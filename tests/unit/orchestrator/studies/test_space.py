@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import load_scenario
+from orchestrator.studies import space as space_module
 from orchestrator.studies.columns import Point
 from orchestrator.studies.space import Space
 from orchestrator.studies.study import MOST_RUNS, study_of
@@ -143,6 +144,22 @@ def test_samples_follow_from_the_seed_and_the_ranges(method):
     other = space(sample={"method": method, "n": 12, "seed": 8, "range": ranges})
     assert other[3].parameters != runs[3].parameters
     assert other.digest != runs.digest
+
+
+@pytest.mark.parametrize("method", ["sobol", "random"])
+def test_samples_are_drawn_page_by_page_in_any_order(method, monkeypatch):
+    monkeypatch.setattr(space_module, "_PAGE", 8)
+    ranges = {"plant.eta0.y": [0.0, 1.0], "plant.eta0.z": [0.0, 1.0]}
+    runs = space(sample={"method": method, "n": 100, "seed": 7, "range": ranges})
+    generator = np.random.default_rng(7)
+    expected = (
+        qmc.Sobol(2, rng=generator).random_base2(7)[:100]
+        if method == "sobol"
+        else generator.random((100, 2))
+    )
+    for numbers in (np.arange(90, 100), np.arange(50), np.array([99, 3, 40, 41, 3])):
+        found = runs.points(numbers).values
+        assert np.array_equal(np.column_stack([*found.values()]), expected[numbers])
 
 
 def test_samples_are_drawn_at_every_combination():

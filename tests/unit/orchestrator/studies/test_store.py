@@ -7,14 +7,19 @@ import signal
 import subprocess
 import sys
 from collections.abc import Mapping
-from itertools import chain
+from itertools import chain, pairwise
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
+from orchestrator.studies import store as store_module
 from orchestrator.studies.columns import Case, Outcome, Outcomes, Points
 from orchestrator.studies.store import StudyResult, open_store, read_study_record
 from orchestrator.vehicle.indices import index_columns
@@ -98,6 +103,20 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     assert rows[0]["time_to_reach"] is None
     assert np.signbit(rows[0].pop("late_error"))
     assert rows[0] | {k: v for k, v in odd.items() if k != "late_error"} == rows[0]
+
+
+@given(st.permutations(range(60)), st.sets(st.integers(1, 59), max_size=12))
+def test_blocks_come_in_any_order_and_may_overlap(numbers, cuts):
+    """Refused runs that are repeated make such blocks; only some are in memory."""
+    with TemporaryDirectory() as folder, patch.object(store_module, "_ROWS", 7):
+        with open_store(Path(folder), RECORD, ["late_error"]) as unfinished:
+            for first, end in pairwise([0, *sorted(cuts), 60]):
+                block = [Outcome(i, {"late_error": 0.3 * i}) for i in numbers[first:end]]
+                unfinished.add(outcomes(*block))
+            unfinished.publish(Toys(60))
+        table = parquet.read_table(Path(folder, "runs.parquet"))
+    assert table["run"].to_pylist() == [*range(60)]
+    assert table["late_error"].to_pylist() == [0.3 * i for i in range(60)]
 
 
 def test_result_gives_columns_and_suggests_names(tmp_path):
