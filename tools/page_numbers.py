@@ -765,7 +765,8 @@ def gains(n: int = 1, engine: EngineName = BATCH, population: int | None = None)
             costs = np.where(
                 peak <= limit, np.log(found["late_error"]), 10.0 + np.log(peak / limit)
             )
-            return np.nan_to_num(costs, nan=np.inf)
+            costs[np.isnan(costs)] = np.inf
+            return costs
 
         for limit in LIMITS:
             found = [

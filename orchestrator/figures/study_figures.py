@@ -197,7 +197,8 @@ class Groups:
 
 
 def _shares(parts: np.ndarray, of: np.ndarray) -> np.ndarray:
-    return np.divide(parts, of, out=np.full(len(of), np.nan), where=of > 0)
+    shares: np.ndarray = np.divide(parts, of, out=np.full(len(of), np.nan), where=of > 0)
+    return shares
 
 
 def _scale(axis: Any, is_wide: bool) -> None:
@@ -296,9 +297,9 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
     [x], y = entry.x, entry.y
     (beside, columns), (below, rows) = (runs.parts(by) for by in (entry.by[-1:], entry.by[:-1]))
     along = runs[x], runs[y]
-    cells = _cells(len(columns) // (len(beside) * len(below)))
+    most = _cells(len(columns) // (len(beside) * len(below)))
     across, down = (
-        bins_of(values, cells, is_wide=runs.logarithmic.get(name))
+        bins_of(values, most, is_wide=runs.logarithmic.get(name))
         for name, values in zip((x, y), along, strict=True)
     )
     shape = len(below), len(beside), len(down.centres), len(across.centres)
@@ -390,12 +391,14 @@ def _draw_density(axes: Axes, points: np.ndarray, are_wide: Sequence[bool], colo
         bins_of(values, _MOST_CELLS, is_wide=is_wide)
         for values, is_wide in zip(points.T, are_wide, strict=True)
     )
-    counts, *_ = np.histogram2d(*points.T, (across.edges, down.edges))
+    shape = len(down.centres), len(across.centres)
+    places = np.ravel_multi_index((down.places(points[:, 1]), across.places(points[:, 0])), shape)
+    counts = np.bincount(places, minlength=prod(shape)).reshape(shape)
     colours = [(*to_rgb(colour), alpha) for alpha in _OPACITIES]
     # With margins, as dots.
     axes.use_sticky_edges = False
     axes.pcolormesh(
-        across.edges, down.edges, np.ma.masked_less(counts.T, 1.0), norm=LogNorm(1.0, counts.max()),
+        across.edges, down.edges, np.ma.masked_equal(counts, 0), norm=LogNorm(1, counts.max()),
         cmap=LinearSegmentedColormap.from_list("density", colours), rasterized=True,
     )  # fmt: skip
 

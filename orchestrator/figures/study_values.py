@@ -158,7 +158,8 @@ class Values:
         columns = (_numbers(self.columns, name) for name in members(factor, self.columns))
         if _NORM.fullmatch(factor):
             squares: np.ndarray = reduce(np.add, (column * column for column in columns))
-            return np.sqrt(squares)
+            norm: np.ndarray = np.sqrt(squares)
+            return norm
         return reduce(np.maximum, columns)
 
     def label(self, value: str) -> str:
