@@ -762,7 +762,7 @@ def gains(n: int = 1, engine: EngineName = BATCH, population: int | None = None)
             found = candidates(ready, place, values)  # noqa: B023
             peak = np.max([found[f"peak_command.{k}"] for k in ACTUATORS], axis=0)
             # Gains whose commands are too large are worse than all others, and failures still more.
-            costs = np.where(
+            costs: np.ndarray = np.where(
                 peak <= limit, np.log(found["late_error"]), 10.0 + np.log(peak / limit)
             )
             costs[np.isnan(costs)] = np.inf

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import replace
 
 import pytest
 
@@ -73,14 +72,10 @@ def test_content_of_a_file(tmp_path):
 
 def test_points_are_those_of_the_sample_or_of_each_range():
     study = study_of("mine", tomllib.loads(TEXT))
-    more = study.with_points(16)
-    assert (more.sample, more.vary) == (study.sample._replace(n=16), study.vary)
-    grid = replace(study, sample=None).with_points(2)
-    assert grid.vary == {
-        "plant.eta0.z": pytest.approx((1.0, 100.0)),
-        "controller.K1[1]": (10.0, 20.0),
-        "controller.saturation": ("tanh", "algebraic"),
-    }
+    assert study.with_points(16) == study_of("mine", tomllib.loads(TEXT.replace("n = 5", "n = 16")))
+    grid = TEXT.partition("[sample]")[0]
+    two = study_of("mine", tomllib.loads(grid)).with_points(2)
+    assert two == study_of("mine", tomllib.loads(grid.replace("n = 3", "n = 2")))
     with pytest.raises(InputError, match="at most 1,000,000,000"):
         study.with_points(10**10)
     lists = study_of("mine", {"scenario": "fig4", "vary": {"plant.ell": [0.3, 0.4]}})
