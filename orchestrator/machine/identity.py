@@ -12,6 +12,9 @@ from pathlib import Path
 #: Packages whose versions determine the rows of a run.
 PACKAGES = ("auv-fmu", "pythonfmu", "fmpy", "numpy")
 
+#: Suffixes of sources in Python, C and CUDA.
+_SOURCES = (".c", ".cu", ".cuh", ".h", ".py")
+
 #: Everything that determines the numbers of a run, as texts by their names.
 Identity = Mapping[str, str]
 
@@ -36,11 +39,11 @@ def package_folder(package: str) -> Path:
 
 @cache
 def code_of(*packages: str) -> str:
-    """Return a digest of the Python and C sources of packages."""
+    """Return a digest of the sources of packages."""
     digest = sha256()
     for package in packages:
         root = package_folder(package)
-        sources = (path for path in root.rglob("*") if path.suffix in (".c", ".h", ".py"))
+        sources = (path for path in root.rglob("*") if path.suffix in _SOURCES)
         for path in sorted(sources):
             digest.update(f"{package}/{path.relative_to(root).as_posix()}\0".encode())
             digest.update(path.read_bytes())

@@ -149,7 +149,7 @@ class Cards:
     least_runs, most_runs = 2**15, 2**19
 
     def __init__(self, instead: str, cards: Sequence[Card] = ()) -> None:
-        """Take some cards; by default, those of the machine when they are needed.
+        """Take some cards; by default, all of the machine, found when they are needed.
 
         Args:
             instead: advice for a machine without one.

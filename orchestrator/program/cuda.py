@@ -70,20 +70,20 @@ static __forceinline__ void seed_copy(generator *noise, uint32_t seed) {
 
 #: Passages about generators, which have their words, and for a card, where neighbours share memory.
 _OWN = (
-    "typedef uint32_t *some_words;",
+    "typedef uint32_t *word_places;",
     "uint32_t words[GENERATOR_WORDS];",
     DRAWING,
     "seed_generator(&it->noise",
 )
 _SHARED = (
     """\
-struct some_words {
+struct word_places {
     uint32_t *first;
     size_t apart; /* words between two of a generator */
     uint32_t &operator[](size_t i) const { return first[i * apart]; }
-    some_words operator+(size_t i) const { return {first + i * apart, apart}; }
+    word_places operator+(size_t i) const { return {first + i * apart, apart}; }
 };""",
-    "some_words words;",
+    "word_places words;",
     _DRAWING,
     "seed_copy(&it->noise",
 )
@@ -91,24 +91,19 @@ struct some_words {
 _MEMORY = """\
 enum {{ WORDS = sizeof(whole) / sizeof(uint64_t), GENERATORS = {generators} }};
 
-template <int SIZE> static __forceinline__ void copy_in(void *to, const uint64_t from[], size_t n,
-                                                        size_t i) {{
-    if (SIZE == sizeof(int)) {{
-        *(int *)to = (int)from[i];
-    }} else {{
-        UNROLLED
-        for (int w = 0; w < SIZE / 8; w++) ((uint64_t *)to)[w] = from[w * n + i];
-    }}
+/* Numbers of 8 bytes, and perhaps one of 4 at the end. */
+template <int SIZE>
+static __forceinline__ void copy_in(void *to, const uint64_t from[], size_t n, size_t i) {{
+    UNROLLED
+    for (int w = 0; w < SIZE / 8; w++) ((uint64_t *)to)[w] = from[w * n + i];
+    if (SIZE % 8) ((uint32_t *)to)[SIZE / 8 * 2] = (uint32_t)from[SIZE / 8 * n + i];
 }}
 
-template <int SIZE, int FIRST = 0>
+template <int SIZE>
 static __forceinline__ void copy_out(const void *from, uint64_t to[], size_t n, size_t i) {{
-    if (SIZE == sizeof(int)) {{
-        to[i] = (uint64_t) * (const uint32_t *)from;
-    }} else {{
-        UNROLLED
-        for (int w = FIRST / 8; w < SIZE / 8; w++) to[w * n + i] = ((const uint64_t *)from)[w];
-    }}
+    UNROLLED
+    for (int w = 0; w < SIZE / 8; w++) to[w * n + i] = ((const uint64_t *)from)[w];
+    if (SIZE % 8) to[SIZE / 8 * n + i] = ((const uint32_t *)from)[SIZE / 8 * 2];
 }}
 
 static __forceinline__ void fetch(simulation *it, const uint64_t memory[], size_t n, size_t i) {{

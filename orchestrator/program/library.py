@@ -217,7 +217,7 @@ class Runner(Protocol):
 
 
 class Runners(Protocol):
-    """What programs run on: the processor, or cards.
+    """The processor or cards, which make the runs of programs.
 
     Attributes:
         least_runs: number of runs that take about as long as a single one.

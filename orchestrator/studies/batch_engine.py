@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property, partial
-from itertools import chain, compress
+from itertools import chain
 from math import ceil
 from typing import Any, NamedTuple
 
@@ -40,8 +40,8 @@ from orchestrator.runs.preparation import Prepared
 from orchestrator.runs.request import PROGRAM
 from orchestrator.runs.result import Result
 from orchestrator.runs.scenario import Scenario
-from orchestrator.studies.columns import Case, Outcomes, Point, Points, Rows, Texts
-from orchestrator.studies.engine import with_functions
+from orchestrator.studies.columns import Case, Outcome, Outcomes, Point, Points, Rows, Texts
+from orchestrator.studies.engine import listed_kinds, with_functions
 from orchestrator.studies.own_functions import OwnFunction
 from orchestrator.studies.own_indices import OwnIndex
 from orchestrator.vehicle.cautions import (
@@ -145,6 +145,13 @@ class _Parameter(NamedTuple):
         return numbers, refused
 
 
+@dataclass(frozen=True)
+class _Column:
+    """The column of a value that varies, in place of a value."""
+
+    name: str
+
+
 class _Programs:
     """The programs of a system.
 
@@ -217,9 +224,12 @@ class _Programs:
         expanded: Mapping[PortName, Any] = self.system.expanded(parameters)
         return {str(self.system.named(name)): value for name, value in expanded.items()}
 
-    def name(self, varied: str) -> str:
-        """Return the name of a single parameter in the system."""
-        return varied if varied in self._names else str(self.system.named(PortName.read(varied)))
+    def split(self, case: Case) -> tuple[Mapping[str, Value], Mapping[str, str]]:
+        """Return the single parameters of runs that do not vary, and the columns of the others."""
+        varied: dict[str, Any] = {name: _Column(name) for name in case.varied}
+        every = self.plain({**case.parameters, **varied})
+        columns = {name: of.name for name, of in every.items() if isinstance(of, _Column)}
+        return {name: value for name, value in every.items() if name not in columns}, columns
 
     def values(
         self, compiled: _Compiled, case: Case, points: Points
@@ -235,11 +245,12 @@ class _Programs:
             self._parameters = self._defaults(compiled)
         parameters, defaults = self._parameters
         values, refused = np.tile(defaults, (len(points), 1)), np.zeros(len(points), dtype=bool)
-        for name, value in self.plain(case.parameters).items():
+        given, columns = self.split(case)
+        for name, value in given.items():
             values[:, parameters[name].place] = parameters[name].number(value)
-        for name in case.varied:
-            parameter = parameters[self.name(name)]
-            values[:, parameter.place], others = parameter.column(points.values[name])
+        for name, column in columns.items():
+            place = parameters[name].place
+            values[:, place], others = parameters[name].column(points.values[column])
             refused |= others
         return values, refused
 
@@ -303,11 +314,6 @@ class _Programs:
             self._cautions(compiled, case, points, results, refused),
         )
 
-    def refused(self, compiled: _Compiled, case: Case, points: Points) -> Outcomes:
-        """Return the outcomes of runs whose values a component refuses."""
-        results = np.full((len(points), compiled.source.n_indices), np.nan)
-        return self.outcomes(compiled, case, points, results, np.ones(len(points), dtype=bool))
-
     def _cautions(
         self,
         compiled: _Compiled,
@@ -317,42 +323,33 @@ class _Programs:
         refused: np.ndarray,
     ) -> Texts:
         """Return the kinds of cautions of runs, from their parameters and results."""
-        before, codes = self._before(case, points)
-        rows = np.column_stack(
-            [codes, *(results[:, place] > above for _, place, above in compiled.watched)]
-        )
-        is_warned = np.array([bool(found) for found in before], dtype=bool)[codes]
-        warned = np.flatnonzero((is_warned | rows[:, 1:].any(axis=1)) & ~refused)
-        distinct, places = np.unique(rows[warned], axis=0, return_inverse=True)
-        kinds = [kind for kind, *_ in compiled.watched]
-        texts = Texts.of(
-            [
-                ", ".join(dict.fromkeys([*before[code], *compress(kinds, marks)]))
-                for code, *marks in distinct.tolist()
-            ]
-        )
-        every = np.zeros(len(points), dtype=np.int32)
-        every[warned] = texts.codes[places]
-        return texts._replace(codes=every)
+        kinds, codes = self._before(case, points)
+        for kind, place, above in compiled.watched:
+            marks = results[:, place] > above
+            if marks.any():
+                distinct, codes = np.unique(2 * codes + marks, return_inverse=True)
+                kinds = [(*kinds[code // 2], *[kind] * (code % 2)) for code in distinct.tolist()]
+        texts = Texts.of([*map(listed_kinds, kinds)])
+        return texts._replace(codes=np.where(refused, 0, texts.codes[codes]))
 
-    def _before(self, case: Case, points: Points) -> tuple[Sequence[Sequence[str]], np.ndarray]:
+    def _before(self, case: Case, points: Points) -> tuple[list[tuple[str, ...]], np.ndarray]:
         """Return kinds of cautions that are known before runs, and their places for each run."""
         watched = {f"{loop.controller}.{name}" for loop in self.loops for name in OBSERVER}
-        names = {self.name(name): name for name in case.varied}
-        varied = {plain: name for plain, name in names.items() if plain in watched}
-        columns = [points.values[name].tolist() for name in varied.values()]
+        given, every = self.split(case)
+        varied = {name: points.values[column] for name, column in every.items() if name in watched}
+        columns = [column.tolist() for column in varied.values()]
         places = dict[tuple[Any, ...], int]()
         codes = [
             places.setdefault(key, len(places))
             for key in zip(points.step.tolist(), *columns, strict=True)
         ]
-        given = self.plain(case.parameters)
-        found = []
+        found = list[tuple[str, ...]]()
         for step, *chosen in places:
             values = {**given, **dict(zip(varied, chosen, strict=True))}
             known = cautions(partial(self.value, values), step, self.loops)
-            found.append([caution.kind for caution in known])
-        return found, np.array(codes, dtype=int)
+            found.append(tuple(caution.kind for caution in known))
+        distinct = {kinds: code for code, kinds in enumerate(dict.fromkeys(found))}
+        return [*distinct], np.array([distinct[kinds] for kinds in found])[codes]
 
     def value(self, parameters: Mapping[str, Value], name: str) -> Value | None:
         """Return the value of a parameter in a run; None if there is no such parameter."""
@@ -426,7 +423,7 @@ class BatchEngine:
 
     def outcomes(self, points: Points) -> Iterator[Outcomes]:
         """Make runs, some at a time."""
-        n = max(ceil(len(points) / _PARTS), self.least_runs)
+        n = min(max(ceil(len(points) / _PARTS), self.least_runs), self.most_runs)
         for first in range(0, len(points), n):
             part = points[first : first + n]
             groups = [*self._groups(part)]
@@ -459,11 +456,11 @@ class BatchEngine:
         try:
             values, refused = programs.values(compiled, case, points)
         except Refusal:
-            return programs.refused(compiled, case, points)
+            return _refused(points)
         if self.functions:
             return Outcomes.joined(
                 [
-                    programs.refused(compiled, case, points[i : i + 1])
+                    _refused(points[i : i + 1])
                     if refused[i]
                     else self._by_rows(programs, compiled, case, points[i : i + 1], values[i])
                     for i in range(len(points))
@@ -489,7 +486,7 @@ class BatchEngine:
         experiment, rows = _with_rows(compiled, point)
         results = compiled.on_processor.run(values, experiment, rows)
         if results is None:
-            return programs.refused(compiled, case, points)
+            return _refused(points)
         made = programs.outcomes(compiled, case, points, results[np.newaxis], np.zeros(1, bool))
         [outcome] = made
         result = programs.result(compiled, point, experiment, rows)
@@ -513,6 +510,11 @@ class BatchEngine:
         if compiled.on_processor.run(values, experiment, rows) is None:
             raise InputError(f"{point.scenario}: a component has refused")
         return programs.result(compiled, point, experiment, rows)
+
+
+def _refused(points: Points) -> Outcomes:
+    """Return the outcomes of runs that a component has refused."""
+    return Outcomes.of(Outcome(number, {}, REFUSED) for number in points.numbers.tolist())
 
 
 def _with_rows(compiled: _Compiled, point: Point) -> tuple[Experiment, np.ndarray]:

@@ -20,14 +20,14 @@ from orchestrator.runs.result import Result
 from orchestrator.studies.columns import Outcome, Outcomes, Point, Points
 from orchestrator.studies.own_functions import OwnFunction
 from orchestrator.studies.own_indices import OwnIndex
-from orchestrator.vehicle.cautions import Caution, Watch, cautions, values_of
+from orchestrator.vehicle.cautions import Watch, cautions, values_of
 from orchestrator.vehicle.indices import Indices
 from orchestrator.vehicle.signals import loops_of
 
 
-def kinds_of(cautions: Iterable[Caution]) -> str | None:
-    """Return the kinds of some cautions as text for an outcome."""
-    return ", ".join(dict.fromkeys(caution.kind for caution in cautions)) or None
+def listed_kinds(kinds: Iterable[str]) -> str | None:
+    """Return kinds of cautions as text for an outcome."""
+    return ", ".join(dict.fromkeys(kinds)) or None
 
 
 def with_functions(outcome: Outcome, functions: Sequence[OwnFunction], result: Result) -> Outcome:
@@ -136,7 +136,8 @@ class FmuEngine:
         ending = run.run([indices, watch, *([result] if self.functions else [])])
         if ending.interrupts:
             raise KeyboardInterrupt
-        kinds = kinds_of([*cautions(values_of(system), point.step, loops), *watch.found()])
+        found = [*cautions(values_of(system), point.step, loops), *watch.found()]
+        kinds = listed_kinds(caution.kind for caution in found)
         if ending.failure is not None:
             return Outcome(point.number, {}, ending.failure, kinds)
         values = indices.values()

@@ -18,7 +18,7 @@ from orchestrator.machine.compilers import (
     machines_compiler,
 )
 
-#: What CUDA has and C++ has not. One thread makes all runs.
+#: Words of CUDA that C++ lacks. One thread makes all runs.
 _HEAD = """\
 #include <float.h>
 #include <limits.h>

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import cache
-from itertools import cycle
+from itertools import chain, cycle
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -21,7 +21,6 @@ from orchestrator.commands.main import main
 from orchestrator.cosim import Order, PortName, System, write_ssp
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
-from orchestrator.program.library import Program
 from orchestrator.runs.preparation import Prepared, load, load_scenario
 from orchestrator.studies.batch_engine import REFUSED, BatchEngine
 from orchestrator.studies.columns import Case, Outcomes, Point, Points
@@ -340,16 +339,17 @@ def test_runs_as_columns_are_those_made_one_by_one():
     assert [outcome.failure for outcome in found] == [None, *[REFUSED] * 4, None]
 
 
-def test_a_program_may_make_all_runs_of_a_block_at_once():
-    """As on a graphics card."""
-
-    class AtOnce(Program):
-        least_runs = most_runs = 1000
-
-    points = Points.of(Point(i, "fig4", {"plant.eta0.y": float(i)}, 0.1, 0.02) for i in range(40))
-    engine = BatchEngine(systems("fig4"), make=AtOnce)
-    [found] = engine.outcomes(points)
-    assert [*found] == [*outcomes_of(engines("fig4")[0], points)]
+def test_a_column_may_be_for_several_vehicles():
+    values = {
+        "auv*.plant.noise.std": np.array([0.0, 0.01, 0.02]),
+        "auv2.plant.m11": 25.0 + np.arange(3),
+    }
+    case, ones = Case("formation-v", {"auv*.plant.m11": 24.0}, (*values,)), np.ones(3)
+    points = Points(np.arange(3), [case], np.zeros(3, dtype=int), values, 0.4 * ones, 0.02 * ones)
+    batch, _ = engines("formation-v")
+    found = [*chain(*batch.outcomes(points))]
+    assert found == [*outcomes_of(batch, points)]
+    assert len({outcome.indices["auv2.peak_command.u"] for outcome in found}) == 3
 
 
 def test_threads_have_noise_of_their_own():

@@ -11,7 +11,7 @@
 
 enum { GENERATOR_WORDS = 624, SHIFT = 397, PAIR = 4 /* words of two normal numbers */ };
 
-typedef uint32_t *some_words;
+typedef uint32_t *word_places;
 
 typedef struct {
     uint32_t place; /* index of the next word; GENERATOR_WORDS: all are used */
@@ -21,7 +21,7 @@ typedef struct {
 } generator;
 
 static void seed_generator(generator *it, uint32_t seed) {
-    some_words x = it->words;
+    word_places x = it->words;
     uint32_t i;
     x[0] = 19650218;
     for (i = 1; i < GENERATOR_WORDS; i++) x[i] = 1812433253 * (x[i - 1] ^ x[i - 1] >> 30) + i;
@@ -46,7 +46,7 @@ static uint32_t twisted(uint32_t upper, uint32_t lower, uint32_t distant) {
     return distant ^ both >> 1 ^ (-(both & 1) & 0x9908b0df);
 }
 
-static void renew_words(some_words x) {
+static void renew_words(word_places x) {
     const uint32_t n = GENERATOR_WORDS;
     uint32_t i;
     for (i = 0; i < n - SHIFT; i++) x[i] = twisted(x[i], x[i + 1], x[i + SHIFT]);
@@ -62,7 +62,7 @@ static uint32_t tempered(uint32_t x) {
 }
 
 /* Returns a number uniform in [0, 1), with 53 bits from two words. */
-static double uniform(some_words x) {
+static double uniform(word_places x) {
     uint32_t upper = tempered(x[0]) >> 5, lower = tempered(x[1]) >> 6;
     return (upper * 67108864.0 + lower) * (1.0 / 9007199254740992.0);
 }
@@ -72,7 +72,7 @@ static double standard_normal(generator *it) {
     if (it->has_next) {
         it->has_next = 0;
     } else {
-        some_words words;
+        word_places words;
         double angle, radius;
         if (it->place > GENERATOR_WORDS - PAIR) {
             renew_words(it->words);

@@ -98,7 +98,7 @@ BANDS = {"kind": "bands", "x": "plant.eta0.z", "show": "late_error"}
         ({"vary": {}}, 'lacks scenario; write scenario = "fig5"'),
         ({"scenario": []}, "scenario = []: write a name, or list of names"),
         ({"vari": {}}, "unknown entry 'vari'; did you mean vary"),
-        ({"engine": "gpu"}, "engine = 'gpu': write fmu or batch"),
+        ({"engine": "fpga"}, "engine = 'fpga': write fmu, batch or gpu"),
         ({"order": "random"}, "order = 'random': write feedthrough, gauss-seidel or jacobi"),
         ({"vary": {"plant.ell": 1.0}}, "vary: plant.ell: write [values], or { from = 1.0"),
         ({"vary": {"plant.ell": []}}, "vary: plant.ell: write [values]"),

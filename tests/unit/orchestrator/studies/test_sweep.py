@@ -23,6 +23,6 @@ def test_missing_packages_are_named_with_a_command_to_install_them(monkeypatch, 
 
 def test_an_unknown_engine_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(module, "find_spec", lambda name: 1)
-    with pytest.raises(InputError, match="engine 'gpu': use one of fmu, batch"):
-        sweep(STUDY, engine="gpu", out=tmp_path / "study")
+    with pytest.raises(InputError, match="engine 'fpga': use one of fmu, batch, gpu"):
+        sweep(STUDY, engine="fpga", out=tmp_path / "study")
     assert not (tmp_path / "study").exists()
