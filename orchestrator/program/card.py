@@ -138,8 +138,11 @@ def find_cards(instead: str) -> list[Card]:
         return [CudaCard(number) for number in range(cupy.cuda.runtime.getDeviceCount())]
     # CuPy without a driver, or for another version of CUDA, raises errors of its own.
     except Exception as error:
+        # The last line of CuPy's advice has the reason.
+        lines = [line.strip() for line in str(error).splitlines() if line.strip(" =")]
+        why = lines[-1] if lines else repr(error)
         raise InputError(
-            f"no graphics card of NVIDIA can be used: {reason(error)}; {instead}"
+            f"no graphics card of NVIDIA can be used: {why}; nvidia-smi shows the driver; {instead}"
         ) from error
 
 

@@ -26,8 +26,9 @@ _HEAD, _KERNELS = (Path(__file__).with_name(name) for name in ("card.cuh", "kern
 
 _INCLUDE = re.compile(r"^#include .*\n", re.MULTILINE)
 
-#: A structure made within an expression.
+#: A structure made within an expression, and the address of one.
 _MADE = re.compile(r"\(([A-Z]\w*)\)\{")
+_ADDRESSED = re.compile(rf"&(?={_MADE.pattern})")
 
 #: The structure of all values of a run, and a declaration in it.
 _SIMULATION = re.compile(
@@ -172,7 +173,7 @@ def in_cuda(source: Source, same: Mapping[int, float] = {}) -> CardText:
 
     """
     text = _INCLUDE.sub("", source.text)
-    text = _MADE.sub(r"\1{", text)
+    text = _MADE.sub(r"\1{", _ADDRESSED.sub("address_of() + ", text))
     text = text.replace("memset(it, 0, sizeof *it);", "")
     for own, shared in zip(_OWN, _SHARED, strict=True):
         text = text.replace(own, shared)

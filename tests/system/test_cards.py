@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from orchestrator import sweep
+from orchestrator.commands.main import main
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.program import card
@@ -117,6 +118,15 @@ def test_runs_equal_the_processor(scenario):
     expected = joined(BatchEngine({scenario: load(scenario, KIND)}), points)
     assert np.isfinite(expected.indices).any()
     assert_same(joined(made, points), expected)
+
+
+def test_runs_of_an_own_controller_equal_the_processor(tmp_path, monkeypatch):
+    """It passes the address of a matrix that it makes in an expression, as C allows."""
+    monkeypatch.chdir(tmp_path)
+    main(["new", "controller", "law", "."])
+    test_runs_equal_the_processor("law.toml")
+    _, cards = engine("law.toml")
+    assert "&(Matrix" in cards.source.text
 
 
 def test_studies_equal_the_processor(tmp_path, monkeypatch):
