@@ -26,9 +26,10 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from datetime import date
 from itertools import pairwise, product
-from math import exp, log
+from math import ceil, exp, log
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -46,6 +47,7 @@ from auv_fmu.remus.remus100 import Parameters, RemusState, accelerations, tail_f
 from fmus.ports.port import H_MAX
 from orchestrator import simulate
 from orchestrator.cosim import PortName, System, Table
+from orchestrator.machine.workers import cores
 from orchestrator.paper.claims import total_variation_until
 from orchestrator.paper.page import numbers, table
 from orchestrator.program.components import definitions_of
@@ -54,10 +56,11 @@ from orchestrator.runs.preparation import load_scenario, prepare_request, with_c
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.columns import Point
+from orchestrator.studies.columns import Outcomes, Point
 from orchestrator.studies.engine import outcomes_of
 from orchestrator.studies.store import StudyResult
-from orchestrator.studies.study import read_study
+from orchestrator.studies.study import BATCH, GPU, EngineName, read_study
+from orchestrator.studies.sweep import Means, Ready, making_runs, prepare_study
 from orchestrator.vehicle.indices import SMALLEST_DISTANCE_LABEL, smallest_distances
 from orchestrator.vehicle.signals import (
     ACTUATORS,
@@ -728,37 +731,51 @@ def differences(path: Path, sizes: tuple[int, ...], activation: str, seed: int) 
 # The best gains
 
 
-def gains(n: int = 1) -> None:
+#: Largest commands of the searches [N, N.m].
+LIMITS = (10.0, 20.0, 80.0)
+
+#: Generations of a search, and candidates of a generation for each gain.
+GENERATIONS, CANDIDATES = 250, 10
+
+
+def gains(n: int = 1, engine: EngineName = BATCH, population: int | None = None) -> None:
     """Search the ranges of the study `gains` for the least `late_error` under a limit of commands.
 
-    It makes 136,000 runs by differential evolution, in six to seven minutes of a core. A search
-    finds good gains, and no proof that there are no better ones; `--runs 2` makes each twice.
+    It makes 136,000 runs by differential evolution, a generation at a time, in six to seven minutes
+    of a core. A search finds good gains, and no proof that there are no better ones; `--runs 2`
+    makes each twice, `--population N` has N candidates in each of 251 generations, and `--engine
+    gpu` makes their runs on a graphics card.
     """
     from scipy.optimize import differential_evolution  # noqa: PLC0415
 
     study = read_study("gains")
-    assert study.sample and study.stop_time
-    ranges, stop_time = study.sample.ranges, study.stop_time.base
-    for scenario in study.scenario:
-        runs = Runs(scenario)
-        has = runs.systems[scenario].components["controller"].variables
+    assert study.sample
+    ready, ranges = prepare_study(study, Means(engine=engine)), study.sample.ranges
+    for place, scenario in enumerate(study.scenario):
+        has = ready.systems[scenario][1].components["controller"].variables
         searched = [name for name in ranges if name.partition(".")[2] in has]
         bounds = [(log(ranges[name].low), log(ranges[name].high)) for name in searched]
+        size = CANDIDATES if population is None else ceil(population / len(searched))
 
-        def cost(logarithms: Sequence[float], limit: float) -> float:
-            own = dict(zip(searched, map(exp, logarithms), strict=True))  # noqa: B023
-            found = runs.indices(scenario, [{**study.parameters, **own}], stop_time=stop_time)  # noqa: B023
-            peak = max(float(found[f"peak_command.{k}"][0]) for k in ACTUATORS)
-            # Gains whose commands are too large are worse than all others.
-            return log(found["late_error"][0]) if peak <= limit else 10.0 + log(peak / limit)
+        def cost(logarithms: np.ndarray, limit: float) -> np.ndarray:
+            values = dict(zip(searched, np.exp(logarithms), strict=True))  # noqa: B023
+            found = candidates(ready, place, values)  # noqa: B023
+            peak = np.max([found[f"peak_command.{k}"] for k in ACTUATORS], axis=0)
+            # Gains whose commands are too large are worse than all others, and failures still more.
+            costs: np.ndarray = np.where(
+                peak <= limit, np.log(found["late_error"]), 10.0 + np.log(peak / limit)
+            )
+            costs[np.isnan(costs)] = np.inf
+            return costs
 
-        for limit in (10.0, 20.0, 80.0):
+        for limit in LIMITS:
             found = [
                 differential_evolution(
-                    cost, bounds, (limit,), maxiter=250, popsize=10, tol=0.0, rng=seed, polish=False
+                    cost, bounds, (limit,), maxiter=GENERATIONS, popsize=size, tol=0.0, rng=seed,
+                    polish=False, vectorized=True, updating="deferred",
                 )
                 for seed in range(1, n + 1)
-            ]
+            ]  # fmt: skip
             best = min(found, key=lambda fit: float(fit.fun))
             others = ", ".join(f"{exp(fit.fun):.3g}" for fit in found)
             print(
@@ -766,6 +783,20 @@ def gains(n: int = 1) -> None:
             )
             for name, value in zip(searched, map(exp, best.x), strict=True):
                 print(f"    {name} = {value:.4g}", flush=True)
+
+
+def candidates(ready: Ready, place: int, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The indices of runs of a study with some values in its scenario at a place."""
+    first, n = ready.space.points(np.array([place])), len(next(iter(values.values())))
+    same = first[np.zeros(n, dtype=int)]
+    runs = replace(same, numbers=np.arange(n), values={**same.values, **values})
+    assert isinstance(ready.engine, BatchEngine)
+    # A part for each thread, since a single block could hold them all.
+    parts = np.array_split(runs.numbers, ready.engine.runners.threads or cores())
+    with making_runs(ready.engine, (runs[part] for part in parts)) as blocks:
+        outcomes = Outcomes.joined([*blocks])
+    rows = outcomes.indices[np.argsort(outcomes.numbers)]
+    return dict(zip(outcomes.columns, rows.T, strict=True))
 
 
 # Studies
@@ -949,9 +980,17 @@ def main() -> int:
     parser.add_argument(
         "--runs", type=int, metavar="N", help="seeds: runs; gains: searches of each"
     )
+    parser.add_argument(
+        "--engine", choices=(BATCH, GPU), help=f"gains: what makes the runs; default: {BATCH}"
+    )
+    parser.add_argument(
+        "--population", type=int, metavar="N",
+        help=f"gains: candidates of a generation; default: {CANDIDATES} for each gain",
+    )  # fmt: skip
     options = parser.parse_args()
-    runs = {} if options.runs is None else {"n": options.runs}
-    return PAGES[options.page](*options.what, **runs) or 0
+    given = {"n": options.runs, "engine": options.engine, "population": options.population}
+    given = {name: value for name, value in given.items() if value is not None}
+    return PAGES[options.page](*options.what, **given) or 0
 
 
 if __name__ == "__main__":

@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle, product
+from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.colors import LogNorm, Normalize
+from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from matplotlib.ticker import LogLocator, NullFormatter
@@ -35,12 +36,18 @@ _HEADING, _NAMES = 0.3, 0.45
 #: row if there is one x.
 _BINS, _LOWER, _UPPER, _ABREAST = 30, 0.1, 0.9, 2
 
-#: Maps: number of bins along each axis, and the share of cells at each end that have the colour of
-#: the end, so that a few outliers do not dim the others.
-_CELLS, _FAR = 24, 0.01
+#: Maps: least and largest number of bins along each axis, number of runs in a cell from which
+#: there are more than the least, and the share of cells at each end that have the colour of the
+#: end, so that a few outliers do not dim the others.
+_CELLS, _MOST_CELLS, _ENOUGH, _FAR = 24, 200, 20, 0.01
 
-#: Up to so many different values have a bin each.
+#: Up to so many different values have a bin each, or as many as a map has cells if each occurs at
+#: least as often as there are values, as in a grid.
 _GRID = 40
+
+#: Fronts: largest number of dots of a part of the runs, and opacities of a cell with one run and of
+#: the one with most.
+_MOST_DOTS, _OPACITIES = 20_000, (0.15, 0.7)
 
 #: Colour scales that the colour-blind can read and that survive print, and the colour of a cell
 #: without runs. Correlations: blue falls, red grows.
@@ -125,7 +132,8 @@ def bins_of(
     if is_wide is None:
         is_wide = is_logarithmic(values) or _is_geometric(np.unique(values))
     places = np.unique(np.log(values) if is_wide else values)
-    if len(places) > _GRID:
+    is_grid = len(places) <= _MOST_CELLS and len(places) ** 2 <= len(values)
+    if len(places) > _GRID and not is_grid:
         even = np.linspace(0.0, 1.0, most + 1)
         edges = np.quantile(places, even) if are_full else np.interp(even, (0, 1), places[[0, -1]])
         centres = 0.5 * (edges[1:] + edges[:-1])
@@ -140,12 +148,57 @@ def bins_of(
     return Bins(edges, centres, is_wide)
 
 
-def grouped(places: np.ndarray, values: np.ndarray, n: int) -> list[np.ndarray]:
-    """Return the finite values in each of n bins, from the number of the bin of each value."""
-    finite = np.isfinite(values)
-    places, values = places[finite], values[finite]
-    order = np.argsort(places, kind="stable")
-    return np.split(values[order], np.searchsorted(places[order], np.arange(1, n)))
+@dataclass(frozen=True)
+class Groups:
+    """The finite values in each of some bins.
+
+    Attributes:
+        values: bin by bin, and sorted in each.
+        ends: the place of the first value of each bin, and that after the last of all.
+
+    """
+
+    values: np.ndarray
+    ends: np.ndarray
+
+    @classmethod
+    def of(cls, places: np.ndarray, values: np.ndarray, n: int) -> Groups:
+        """Group values in n bins by the number of the bin of each."""
+        finite = np.isfinite(values)
+        if not finite.all():
+            places, values = places[finite], values[finite]
+        # Small numbers are sorted sooner.
+        places = places.astype(np.min_scalar_type(n))
+        order = np.lexsort((values, places))
+        sizes = np.bincount(places, minlength=n)
+        return cls(values[order], np.append(0, sizes.cumsum()))
+
+    @property
+    def means(self) -> np.ndarray:
+        """Mean of each bin; nan for an empty one."""
+        sums = np.append(0.0, self.values.cumsum())[self.ends]
+        return _shares(np.diff(sums), np.diff(self.ends))
+
+    def quantiles(self, share: float) -> np.ndarray:
+        """Return a quantile of each bin, between its values; nan for an empty one."""
+        first, last = self.ends[:-1], self.ends[1:] - 1
+        place = share * (last - first)
+        low = first + np.floor(place).astype(int)
+        has = first <= last
+        ends = np.full((2, len(first)), np.nan)
+        for row, places in zip(ends, (low, np.minimum(low + 1, last)), strict=True):
+            row[has] = self.values[places[has]]
+        quantiles: np.ndarray = ends[0] + (place % 1.0) * (ends[1] - ends[0])
+        return quantiles
+
+    def middles(self, value: str) -> np.ndarray:
+        """Return what stands for each bin: the share of a verdict, else the median."""
+        return self.means if value in VERDICTS else self.quantiles(0.5)
+
+
+def _shares(parts: np.ndarray, of: np.ndarray) -> np.ndarray:
+    shares: np.ndarray = np.divide(parts, of, out=np.full(len(of), np.nan), where=of > 0)
+    return shares
 
 
 def _scale(axis: Any, is_wide: bool) -> None:
@@ -202,27 +255,29 @@ def bands(entry: FigureEntry, title: str, runs: Values) -> Figure:
     shown = list(product(entry.show, entry.x))
     sharing = "row" if len(entry.x) > 1 else False
     figure, panels = _panels(title, -(-len(shown) // abreast), abreast, _ROW, sharey=sharing)
-    parts = list(runs.parts(entry.by))
+    labels, parts = runs.parts(entry.by)
+    along: dict[str, tuple[Bins, np.ndarray]] = {}
+    for x in entry.x:
+        column = runs[x]
+        bins = bins_of(column, _BINS, are_full=True, is_wide=runs.logarithmic.get(x))
+        along[x] = bins, parts * len(bins.centres) + bins.places(column)
     for axes, (value, x) in zip(panels.flat, shown, strict=False):
-        bins = bins_of(runs[x], _BINS, are_full=True, is_wide=runs.logarithmic.get(x))
-        for (label, part), colour, style in zip(parts, cycle(COLOURS), cycle(STYLES), strict=False):
-            line = {"color": colour, "linestyle": style, "label": label}
-            groups = grouped(bins.places(part[x]), part[value], len(bins.centres))
-            middle = np.mean if value in VERDICTS else np.median
-            axes.plot(bins.centres, [_of_group(middle, group) for group in groups], **line)
+        bins, places = along[x]
+        shape, column = (len(labels), len(bins.centres)), runs[value]
+        groups = Groups.of(places, column, shape[0] * shape[1])
+        middles = groups.middles(value).reshape(shape)
+        ends = [groups.quantiles(share).reshape(shape) for share in (_LOWER, _UPPER)]
+        for label, middle, low, high, colour, style in zip(
+            labels, middles, *ends, cycle(COLOURS), cycle(STYLES), strict=False
+        ):
+            axes.plot(bins.centres, middle, color=colour, linestyle=style, label=label)
             if value not in VERDICTS:
-                ends = [
-                    np.quantile(group, (_LOWER, _UPPER)) if len(group) else (np.nan, np.nan)
-                    for group in groups
-                ]
-                axes.fill_between(
-                    bins.centres, *np.transpose(ends), color=colour, alpha=0.2, linewidth=0
-                )
+                axes.fill_between(bins.centres, low, high, color=colour, alpha=0.2, linewidth=0)
         if value in entry.limits:
             axes.axhline(entry.limits[value], color="black", linewidth=0.8, label="limit")
         axes.margins(x=0)
         _scale(axes.xaxis, bins.is_logarithmic)
-        _scale(axes.yaxis, is_logarithmic(runs[value]))
+        _scale(axes.yaxis, is_logarithmic(column))
         axes.set_xlabel(runs.label(x))
         if x == entry.x[0]:
             axes.set_title(runs.label(value))
@@ -234,39 +289,33 @@ def bands(entry: FigureEntry, title: str, runs: Values) -> Figure:
     return figure
 
 
-def _of_group(reduction: Callable[..., Any], group: np.ndarray) -> Any:
-    return reduction(group) if len(group) else np.nan
-
-
 def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
     """Draw panels of medians, or of shares of verdicts, with one colour scale for each value shown.
 
     The values of the last column that tells runs apart are side by side, the others stacked.
     """
     [x], y = entry.x, entry.y
+    (beside, columns), (below, rows) = (runs.parts(by) for by in (entry.by[-1:], entry.by[:-1]))
+    along = runs[x], runs[y]
+    most = _cells(len(columns) // (len(beside) * len(below)))
     across, down = (
-        bins_of(runs[name], _CELLS, is_wide=runs.logarithmic.get(name)) for name in (x, y)
+        bins_of(values, most, is_wide=runs.logarithmic.get(name))
+        for name, values in zip((x, y), along, strict=True)
     )
-    shape = len(down.centres), len(across.centres)
-    beside = [name for name, _ in runs.parts(entry.by[-1:])]
-    below = list(runs.parts(entry.by[:-1]))
-    rows = len(entry.show) * len(below)
-    figure, panels = _panels(title, rows, len(beside), _ROW, sharex=True, sharey=True)
+    shape = len(below), len(beside), len(down.centres), len(across.centres)
+    places = np.ravel_multi_index(
+        (rows, columns, down.places(along[1]), across.places(along[0])), shape
+    )
+    figure, panels = _panels(
+        title, len(entry.show) * len(below), len(beside), _ROW, sharex=True, sharey=True
+    )
     has_gaps = False
     for value, own in zip(entry.show, np.split(panels, len(entry.show)), strict=True):
-        middle = np.mean if value in VERDICTS else np.median
-        drawn: dict[Axes, np.ndarray] = {}
-        for row, (name, part) in zip(own, below, strict=True):
+        middles = Groups.of(places, runs[value], prod(shape)).middles(value).reshape(shape)
+        for row, name in zip(own, below, strict=True):
             row[0].set_ylabel("\n".join(filter(None, (name, runs.label(y)))))
-            for column, cell in part.parts(entry.by[-1:]):
-                places = down.places(cell[y]), across.places(cell[x])
-                groups = grouped(
-                    np.ravel_multi_index(places, shape), cell[value], shape[0] * shape[1]
-                )
-                middles = [_of_group(middle, group) for group in groups]
-                drawn[row[beside.index(column)]] = np.reshape(middles, shape)
-        norm = _colour_scale(np.array(list(drawn.values())), value in VERDICTS)
-        for axes, cells in drawn.items():
+        norm = _colour_scale(middles, value in VERDICTS)
+        for axes, cells in zip(own.flat, middles.reshape(-1, *shape[2:]), strict=True):
             image = axes.pcolormesh(
                 across.edges, down.edges, cells, norm=norm, cmap=_VALUES, rasterized=True
             )
@@ -278,7 +327,7 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
         label = runs.label(value)
         if value in entry.limits:
             label += f"\n(white line: {entry.limits[value]:g})"
-        has_gaps |= bool(np.isnan(list(drawn.values())).any())
+        has_gaps |= bool(np.isnan(middles).any())
         # A share has ends; other scales end before the most distant values.
         has_ends = (norm.vmin, norm.vmax) == (0.0, 1.0)
         figure.colorbar(
@@ -295,6 +344,11 @@ def maps(entry: FigureEntry, title: str, runs: Values) -> Figure:
     return figure
 
 
+def _cells(n: int) -> int:
+    """Return the number of bins along each axis of a map of n runs."""
+    return int(np.clip((n / _ENOUGH) ** 0.5, _CELLS, _MOST_CELLS))
+
+
 def _colour_scale(values: np.ndarray, is_verdict: bool) -> Any:
     values = values[np.isfinite(values)]
     if is_verdict or not len(values):
@@ -304,22 +358,49 @@ def _colour_scale(values: np.ndarray, is_verdict: bool) -> Any:
 
 
 def front(entry: FigureEntry, title: str, runs: Values) -> Figure:
-    """Draw a dot for each run, and a line through those that no other beats in both values."""
+    """Draw a dot for each run, and a line through those that no other beats in both values.
+
+    Where runs are many, colours show how many there are.
+    """
     figure, [[axes]] = _panels(title, 1, 1, _SQUARE)
     [x] = entry.x
-    for (name, part), colour, style in zip(
-        runs.parts(entry.by), cycle(COLOURS), cycle(STYLES), strict=False
+    labels, parts = runs.parts(entry.by)
+    along = np.column_stack((runs[x], runs[entry.y]))
+    are_wide = [is_logarithmic(values) for values in along.T]
+    for part, (name, colour, style) in enumerate(
+        zip(labels, cycle(COLOURS), cycle(STYLES), strict=False)
     ):
-        points = np.column_stack((part[x], part[entry.y]))
+        points = along[parts == part]
         points = points[np.isfinite(points).all(axis=1)]
-        axes.plot(*points.T, ".", color=colour, markersize=2, alpha=0.25, rasterized=True)
+        if len(points) > _MOST_DOTS:
+            _draw_density(axes, points, are_wide, colour)
+        else:
+            axes.plot(*points.T, ".", color=colour, markersize=2, alpha=0.25, rasterized=True)
         line = {"color": colour, "linestyle": style, "label": name, "drawstyle": "steps-post"}
         axes.plot(*pareto_front(points).T, **line)
-    _scale(axes.xaxis, is_logarithmic(runs[x]))
-    _scale(axes.yaxis, is_logarithmic(runs[entry.y]))
+    for axis, is_wide in zip((axes.xaxis, axes.yaxis), are_wide, strict=True):
+        _scale(axis, is_wide)
     axes.set(xlabel=runs.label(x), ylabel=runs.label(entry.y))
     _add_legend(figure)
     return figure
+
+
+def _draw_density(axes: Axes, points: np.ndarray, are_wide: Sequence[bool], colour: str) -> None:
+    """Colour the cells of a plane in which there are points, the more of them the stronger."""
+    across, down = (
+        bins_of(values, _MOST_CELLS, is_wide=is_wide)
+        for values, is_wide in zip(points.T, are_wide, strict=True)
+    )
+    shape = len(down.centres), len(across.centres)
+    places = np.ravel_multi_index((down.places(points[:, 1]), across.places(points[:, 0])), shape)
+    counts = np.bincount(places, minlength=prod(shape)).reshape(shape)
+    colours = [(*to_rgb(colour), alpha) for alpha in _OPACITIES]
+    # With margins, as dots.
+    axes.use_sticky_edges = False
+    axes.pcolormesh(
+        across.edges, down.edges, np.ma.masked_equal(counts, 0), norm=LogNorm(1, counts.max()),
+        cmap=LinearSegmentedColormap.from_list("density", colours), rasterized=True,
+    )  # fmt: skip
 
 
 def pareto_front(points: np.ndarray) -> np.ndarray:
@@ -336,12 +417,12 @@ def influence(entry: FigureEntry, title: str, runs: Values) -> Figure:
     Colours are Spearman's rank correlations: 1 if a value always grows with x, -1 if it falls, 0 if
     it does neither.
     """
-    parts = list(runs.parts(entry.by))
-    height = max(_LINE * len(entry.show), _BAR / len(parts)) + _AROUND
-    figure, panels = _panels(title, len(parts), 1, height, sharex=True)
+    labels, parts = runs.parts(entry.by)
+    height = max(_LINE * len(entry.show), _BAR / len(labels)) + _AROUND
+    figure, panels = _panels(title, len(labels), 1, height, sharex=True)
     has_gaps = has_small = False
-    for axes, (name, part) in zip(panels.flat, parts, strict=True):
-        matrix = np.array([[_correlation(part[x], part[y]) for x in entry.x] for y in entry.show])
+    for part, (axes, name) in enumerate(zip(panels.flat, labels, strict=True)):
+        matrix = _correlations(entry, runs, np.flatnonzero(parts == part))
         image = axes.imshow(matrix, cmap=_CORRELATIONS, vmin=-1.0, vmax=1.0, aspect="auto")
         for (row, column), value in np.ndenumerate(matrix):
             if abs(value) >= _NOTHING:
@@ -379,14 +460,45 @@ def _turn_long_names(figure: Figure, axes: Axes) -> None:
             name.set(ha="right", rotation_mode="anchor")
 
 
-def _correlation(x: np.ndarray, y: np.ndarray) -> float:
-    """Return Spearman's rank correlation of the runs with both values; nan if one is constant."""
-    from scipy.stats import spearmanr  # noqa: PLC0415
+def _correlations(entry: FigureEntry, runs: Values, rows: np.ndarray) -> np.ndarray:
+    """Return Spearman's rank correlations of the values shown with each x.
 
-    both = np.isfinite(x) & np.isfinite(y)
-    if min(len(np.unique(x[both])), len(np.unique(y[both]))) < 2:
-        return np.nan
-    return float(spearmanr(x[both], y[both]).statistic)
+    They are of the runs that have both values, and nan if one of them is constant.
+    """
+    matrix = np.full((len(entry.show), len(entry.x)), np.nan)
+    # Values that are missing in the same runs share the ranks of x.
+    shown: dict[bytes, tuple[np.ndarray, list[tuple[int, np.ndarray]]]] = {}
+    for i, value in enumerate(entry.show):
+        column = runs[value][rows]
+        has = np.isfinite(column)
+        ranks = _ranks(_codes(column[has]))
+        shown.setdefault(np.packbits(has).tobytes(), (has, []))[1].append((i, ranks))
+    for j, x in enumerate(entry.x):
+        column = runs[x][rows]
+        codes = _codes(column)
+        for has, same in shown.values():
+            both = np.isfinite(column[has])
+            own = _ranks(codes[has][both])
+            for i, ranks in same:
+                others = ranks if both.all() else _ranks(_codes(ranks[both]))
+                matrix[i, j] = own @ others if len(own) else np.nan
+    return matrix
+
+
+def _codes(values: np.ndarray) -> np.ndarray:
+    """Return the place of each value among those that occur."""
+    codes: np.ndarray = np.unique(values, return_inverse=True)[1]
+    return codes
+
+
+def _ranks(codes: np.ndarray) -> np.ndarray:
+    """Return the ranks of codes, of mean 0 and norm 1; equal ones share theirs, nan if all are."""
+    counts = np.bincount(codes)
+    ranks: np.ndarray = (counts.cumsum() - 0.5 * (counts - 1))[codes]
+    ranks -= 0.5 * (len(codes) + 1)
+    with np.errstate(invalid="ignore"):
+        ranks /= np.linalg.norm(ranks)
+    return ranks
 
 
 #: Functions that draw the kinds of figures.
@@ -422,7 +534,7 @@ def draw_figures(
         if lacking:
             yield f"figure {entry.name} left out: no run has {lacking[0]}"
             continue
-        if (parts := len(list(shown.parts(entry.by)))) > _MOST_PARTS:
+        if (parts := len(shown.parts(entry.by)[0])) > _MOST_PARTS:
             yield (
                 f"figure {entry.name} left out: by splits the runs into {parts} parts, more than "
                 f"{_MOST_PARTS}"

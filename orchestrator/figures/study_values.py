@@ -69,11 +69,14 @@ def _index_of(value: str) -> tuple[Index, str, str] | None:
     return index, next(filter(None, member), ""), vehicle or ""
 
 
+def _numbers(columns: Columns, name: str) -> np.ndarray:
+    return columns[name].astype(float, copy=False)
+
+
 def _largest(columns: Columns, index: str) -> np.ndarray:
     """Return the largest member of an index in each run, over all vehicles."""
     named = [name for name in columns if (parts := _index_of(name)) and parts[0].name == index]
-    largest: np.ndarray = np.max([columns[name].astype(float) for name in named], axis=0)
-    return largest
+    return reduce(np.maximum, (_numbers(columns, name) for name in named))
 
 
 #: Values that are true or false for a run: labels, and functions of the columns. Figures show the
@@ -97,14 +100,17 @@ VERDICTS: Mapping[str, tuple[str, Callable[[Columns], np.ndarray]]] = {
 
 
 class _Some(Mapping[str, np.ndarray]):
-    """The columns of some runs, each of which is taken when it is asked for."""
+    """Some rows of columns, each of which is read when it is needed."""
 
     def __init__(self, columns: Columns, rows: np.ndarray) -> None:
-        self._columns, self._chosen = columns, rows
+        self._columns, self._rows = columns, rows
 
     def __getitem__(self, name: str) -> np.ndarray:
-        column: np.ndarray = self._columns[name][self._chosen]
-        return column
+        some: np.ndarray = self._columns[name][self._rows]
+        return some
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._columns
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._columns)
@@ -148,10 +154,13 @@ class Values:
         return product
 
     def _factor(self, factor: str) -> np.ndarray:
-        columns = [self.columns[name].astype(float) for name in members(factor, self.columns)]
-        reduction = np.linalg.norm if _NORM.fullmatch(factor) else np.max
-        values: np.ndarray = reduction(columns, axis=0)
-        return values
+        # One after the other, since all at once would not fit the memory.
+        columns = (_numbers(self.columns, name) for name in members(factor, self.columns))
+        if _NORM.fullmatch(factor):
+            squares: np.ndarray = reduce(np.add, (column * column for column in columns))
+            norm: np.ndarray = np.sqrt(squares)
+            return norm
+        return reduce(np.maximum, columns)
 
     def label(self, value: str) -> str:
         """Return the label of a value, with its unit in brackets."""
@@ -181,24 +190,29 @@ class Values:
     def where(self, values: Mapping[str, Any]) -> Values:
         """Return the runs with some values in some columns."""
         fitting = [self.columns[name] == value for name, value in values.items()]
-        return self._rows(np.all(fitting, axis=0)) if fitting else self
+        if not fitting:
+            return self
+        return replace(self, columns=_Some(self.columns, np.flatnonzero(np.all(fitting, axis=0))))
 
-    def _rows(self, rows: np.ndarray) -> Values:
-        return replace(self, columns=_Some(self.columns, rows))
-
-    def parts(self, by: Sequence[str]) -> Iterator[tuple[str, Values]]:
-        """Yield the runs that agree in some columns, each part with a text that distinguishes it.
+    def parts(self, by: Sequence[str]) -> tuple[list[str], np.ndarray]:
+        """Split the runs into those that agree in some columns.
 
         A run without a value in one of the columns differs from all that have one.
+
+        Returns:
+            Texts that distinguish the parts, and the place of each run's part among them.
+
         """
-        keys = list(zip(*(self.columns[name].tolist() for name in by), strict=True))
-        keys = [tuple(None if _is_nan(part) else part for part in key) for key in keys]
-        for key in dict.fromkeys(keys):
-            pairs = zip(by, key, strict=True)
-            text = ", ".join(self.named(name, value) for name, value in pairs if value is not None)
-            yield text, self._rows(np.array([other == key for other in keys]))
-        if not by:
-            yield "", self
+        columns = [self.columns[name] for name in by]
+        if not columns:
+            return [""], np.zeros(len(next(iter(self.columns.values()))), dtype=np.uint8)
+        first, places = _parts(columns)
+        keys = zip(*(column[first].tolist() for column in columns), strict=True)
+        pairs = (zip(by, key, strict=True) for key in keys)
+        return [
+            ", ".join(self.named(*pair) for pair in some if not _is_missing(pair[1]))
+            for some in pairs
+        ], places
 
     def named(self, name: str, value: Any) -> str:
         """Return a text for the runs with a value in a column."""
@@ -236,5 +250,24 @@ def _factors(value: str) -> list[str]:
     return [factor.strip() for factor in value.split(" * ")]
 
 
-def _is_nan(value: Any) -> bool:
-    return isinstance(value, float) and isnan(value)
+def _is_missing(value: Any) -> bool:
+    return value is None or (isinstance(value, float) and isnan(value))
+
+
+def _parts(columns: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the first row of each combination of values, and the place of each row's."""
+    codes = np.zeros(len(columns[0]), dtype=np.int64)
+    for column in columns:
+        if column.dtype == object:
+            known = dict[Any, int]()
+            every = [known.setdefault(value, len(known)) for value in column.tolist()]
+            codes = codes * len(known) + every
+        else:
+            distinct = np.unique(column)
+            codes = codes * len(distinct) + np.searchsorted(distinct, column)
+    # Small numbers are sorted sooner.
+    codes = codes.astype(np.min_scalar_type(codes.max()))
+    _, first, places = np.unique(codes, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    ranks = np.argsort(order).astype(np.min_scalar_type(len(order)))
+    return first[order], ranks[places]

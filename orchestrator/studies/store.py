@@ -501,8 +501,15 @@ class StudyResult(Mapping[str, np.ndarray]):
         """
         if column not in self:
             raise KeyError(f"no column {column!r}{did_you_mean(str(column), [*self])}")
-        values: np.ndarray = self._read(lambda table: table.read([column]))[column].to_numpy()
-        return values
+        values = self._read(lambda table: table.read([column]))[column]
+        if values.type != import_module("pyarrow").string():
+            numbers: np.ndarray = values.to_numpy()
+            return numbers
+        # Each text once, since millions of equal ones would fill the memory.
+        texts = values.combine_chunks().dictionary_encode()
+        known = np.array([*texts.dictionary.to_pylist(), None], dtype=object)
+        every: np.ndarray = known[texts.indices.fill_null(len(known) - 1).to_numpy()]
+        return every
 
     def to_dataframe(self) -> pd.DataFrame:
         """Return all columns as a pandas DataFrame, indexed by the number of the run.

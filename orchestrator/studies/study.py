@@ -9,7 +9,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Self, TypeAlias, get_args
 
@@ -73,11 +73,16 @@ _USUAL, _ALL = ("late_error", "peak_command"), "lost"
 
 
 class Range(NamedTuple):
-    """A range of a sampled value."""
+    """A range of a sampled value, or of the values of a grid."""
 
     low: float
     high: float
     spacing: str = LINEAR_SPACING
+
+    def grid(self, n: int) -> tuple[float, ...]:
+        """Return n values from one end to the other."""
+        between = np.geomspace if self.spacing == LOG_SPACING else np.linspace
+        return tuple(between(self.low, self.high, n).tolist())
 
 
 class Sample(NamedTuple):
@@ -138,6 +143,7 @@ class Study:
     Attributes:
         name: stem of the file.
         vary: values by `component.parameter`, in the order of the file.
+        ranges: of the values in `vary` that lie between two ends, by name.
         folder: of the file; None without a file.
 
     """
@@ -152,6 +158,7 @@ class Study:
     order: Order | None = None
     parameters: Mapping[str, Any] = field(default_factory=dict)
     vary: Mapping[str, Sequence[Any]] = field(default_factory=dict)
+    ranges: Mapping[str, Range] = field(default_factory=dict)
     sample: Sample | None = None
     figures: Mapping[str, Any] = field(default_factory=dict)
     folder: Path | None = None
@@ -165,6 +172,25 @@ class Study:
     def varied(self) -> tuple[str, ...]:
         """Names of all values that vary."""
         return (*self.vary, *(self.sample.names if self.sample else ()))
+
+    def with_points(self, n: int) -> Study:
+        """Return the study with n points in its sample, or in each range if it has no sample.
+
+        Raises:
+            InputError: it has neither, or n is too large.
+
+        """
+        if not (self.sample or self.ranges):
+            raise InputError(
+                f"--points {n}: {self.name} has neither a sample nor a range "
+                "{ from, to, n } under [vary]"
+            )
+        if n > (most := MOST_RUNS if self.sample else _MOST_VALUES):
+            raise InputError(f"--points {n}: must be at most {most:,}")
+        if self.sample:
+            return replace(self, sample=self.sample._replace(n=n))
+        grids = {name: limits.grid(n) for name, limits in self.ranges.items()}
+        return replace(self, vary={**self.vary, **grids})
 
 
 # The file
@@ -358,10 +384,14 @@ def study_of(name: str, content: Mapping[str, Any], path: Path | None = None) ->
         for scenario in ([names] if isinstance(names, str) else names)
     )
     entries["parameters"] = dict(flatten(content.get("parameters", {}), System.is_spread))
-    entries["vary"] = {}
+    entries["vary"], entries["ranges"] = {}, {}
     for key, value in flatten(content.get("vary", {}), _is_range):
         with findings.collecting():
-            entries["vary"][key] = _values(f"{where}: vary: {key}", value)
+            if isinstance(value, list) and value:
+                entries["vary"][key] = tuple(value)
+            else:
+                entries["ranges"][key] = limits = _grid_range(f"{where}: vary: {key}", value)
+                entries["vary"][key] = limits.grid(value["n"])
     if "sample" in content:
         with findings.collecting():
             entries["sample"] = _sample(f"{where}: sample", content["sample"])
@@ -378,16 +408,12 @@ def _is_range(value: Any) -> bool:
     return isinstance(value, Mapping) and bool({"from", "to"} & value.keys())
 
 
-def _values(where: str, value: Any) -> tuple[Any, ...]:
-    """Return the values of a list, or of a range under `vary`."""
-    if isinstance(value, list) and value:
-        return tuple(value)
+def _grid_range(where: str, value: Any) -> Range:
+    """Return a range under `vary`."""
     if not _is_range(value):
         raise InputError(f"{where}: write [values], or {{ from = 1.0, to = 10.0, n = 7 }}")
     GridTable.check(where, value)
-    low, high, spacing = _range(where, value)
-    between = np.geomspace if spacing == LOG_SPACING else np.linspace
-    return tuple(between(low, high, value["n"]).tolist())
+    return _range(where, value)
 
 
 def _range(where: str, value: Any) -> Range:

@@ -80,10 +80,15 @@ class Means:
     """Options of making the runs of a study.
 
     Raises:
-        InputError: two options exclude each other.
+        InputError: two options exclude each other, or a number is below 1.
 
     """
 
+    points: int | None = option(
+        None,
+        "number of points in place of the study's: of its sample, or, without a sample, of each "
+        "range { from, to, n } under [vary]; default: from the study",
+    )
     engine: EngineName | None = option(
         None,
         "engine that makes the runs: fmu (the FMUs), batch (the system as one program; the same "
@@ -103,8 +108,9 @@ class Means:
     force: bool = option(False, FORCE)
 
     def __post_init__(self) -> None:
-        if self.workers is not None and self.workers < 1:
-            raise InputError(f"--workers {self.workers}: must be at least 1")
+        for name, n in (("points", self.points), ("workers", self.workers)):
+            if n is not None and n < 1:
+                raise InputError(f"--{name} {n}: must be at least 1")
         if self.workers is not None and self.scheduler is not None:
             raise InputError(
                 "--workers sets the processes on this machine; workers of a scheduler are started "
@@ -116,6 +122,7 @@ def sweep(
     study: str | Path | Mapping[str, Any],
     *,
     indices: Mapping[str, Callable[[Result], object]] | None = None,
+    points: int | None = None,
     engine: EngineName | None = None,
     kind: KindName = AUTO,
     loop: Plan.Loop = Plan.LOOPS[0],
@@ -134,6 +141,8 @@ def sweep(
         study: name of a ready study, path of a .toml file, or a dictionary with its entries.
         indices: your own by their names: functions of the result of a run, which return a number,
             or a list or dictionary of numbers; :meth:`.Result.metrics` tries them on one result.
+        points: number of points in place of the study's: of its sample, or, without a sample, of
+            each range `{ from, to, n }` under `vary`; None: the study's own.
         engine: engine that makes the runs, `fmu`, `batch` or `gpu`; None: the study's own.
         kind: kind of the bundle's FMUs: `python`, `native`, or `auto`: the kind with which the
             study began, else native where available.
@@ -152,7 +161,7 @@ def sweep(
 
     """
     parsed = study_of(_NAMELESS, study) if isinstance(study, Mapping) else read_study(str(study))
-    means = Means(engine, kind, loop, scheduler, workers, force)
+    means = Means(points, engine, kind, loop, scheduler, workers, force)
     return complete_study(
         parsed,
         means,
@@ -197,6 +206,8 @@ def complete_study(
     from orchestrator.figures.study_figures import draw_figures, figure_files  # noqa: PLC0415
 
     check_installed(_NEEDED if means.scheduler is None else (*_NEEDED, "distributed"))
+    if means.points is not None:
+        study = study.with_points(means.points)
     kind = _kind_begun(folder) if means.kind == AUTO else means.kind
     ready = prepare_study(study, replace(means, kind=kind), functions)
     space, engine = ready.space, ready.engine

@@ -19,7 +19,9 @@ from orchestrator.program import card
 from orchestrator.program.card import CardProgram, Cards, find_cards
 from orchestrator.program.cuda import in_cuda
 from orchestrator.program.library import Source
-from orchestrator.runs.preparation import load
+from orchestrator.program.session import stepped_program
+from orchestrator.runs.preparation import load, prepare_options
+from orchestrator.runs.request import SystemOptions
 from orchestrator.runs.scenario import names
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.columns import Outcomes, Point, Points
@@ -90,6 +92,14 @@ def test_programs_are_cuda(scenario):
     for text in in_cuda(cards.source):
         for architecture in ARCHITECTURES:
             assert compiled(text, f"-arch={architecture}", "--Ofast-compile=max")
+
+
+@pytest.mark.skipif(library() is None, reason="NVRTC is not installed")
+def test_programs_for_single_steps_are_cuda():
+    options = SystemOptions("fig4", {})
+    program = stepped_program(prepare_options(options, is_open=True).plan, is_quick=True)
+    for text in in_cuda(program.source):
+        assert compiled(text, f"-arch={ARCHITECTURES[1]}", "--Ofast-compile=max")
 
 
 @pytest.mark.skipif(library() is None, reason="NVRTC is not installed")

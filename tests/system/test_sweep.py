@@ -102,11 +102,17 @@ def test_command_makes_what_is_missing_and_nothing_twice(study, capfd):
     assert main([*command[:-2], "--kind", "python"]) == 2
     study.write_text(STUDY.replace("4.0]", "5.0]"))
     assert main(command) == 2
+    study.write_text(STUDY.replace("[0.0, 4.0]", "{ from = 0.0, to = 4.0, n = 2 }"))
+    assert main(command) == 0
+    assert main([*command, "--points", "3"]) == 2
+    assert main([*command, "--points", "0"]) == 2
     err = capfd.readouterr().err.splitlines()
     assert [line.split("; ")[0] for line in err] == [
         "auv-fmu: results/mine holds another study, which differs in the FMU of controller, "
         "the FMU of disturbance, the FMU of planner, the FMU of plant",
         "auv-fmu: results/mine holds another study, which differs in vary, points",
+        "auv-fmu: results/mine holds another study, which differs in vary, points",
+        "auv-fmu: --points 0: must be at least 1",
     ]
     assert files(folder)["runs.parquet"] == before["runs.parquet"]
 

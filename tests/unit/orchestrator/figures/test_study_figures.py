@@ -8,10 +8,10 @@ import pytest
 from orchestrator.figures import study_figures, study_values
 from orchestrator.figures.drawing import styled
 from orchestrator.figures.study_figures import (
+    Groups,
     bands,
     bins_of,
     draw_figures,
-    grouped,
     influence,
     is_logarithmic,
     maps,
@@ -221,6 +221,8 @@ def test_groups_are_the_finite_values_of_each_bin():
     places, values = random.integers(0, 5, 40), random.normal(size=40)
     values[::7] = np.nan
     places[places == 3] = 4
-    for place, group in enumerate(grouped(places, values, 6)):
+    groups = Groups.of(places, values, 6)
+    for place, low, mean in zip(range(6), groups.quantiles(0.1), groups.means, strict=True):
         expected = [v for p, v in zip(places, values, strict=True) if p == place and np.isfinite(v)]
-        assert sorted(group) == sorted(expected)
+        wanted = (np.quantile(expected, 0.1), np.mean(expected)) if expected else (np.nan, np.nan)
+        np.testing.assert_allclose((low, mean), wanted, rtol=1e-12)

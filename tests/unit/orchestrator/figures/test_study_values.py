@@ -63,15 +63,15 @@ def test_a_value_is_known_if_runs_have_its_columns(value, known):
 
 def test_runs_without_a_value_are_a_part():
     legends = {"fig5": "proposed", "fig5-pd": "PD"}
-    parts = dict(Values(columns(), legends=legends).parts(["scenario", "controller.k_d"]))
-    assert list(parts) == [
+    values = Values(columns(), legends=legends)
+    texts, places = values.parts(["scenario", "controller.k_d"])
+    assert texts == [
         "proposed, controller.k_d 10", "PD", "proposed, controller.k_d 20",
         "proposed, controller.k_d 30",
     ]  # fmt: skip
-    assert parts["PD"]["step"].tolist() == [0.02, 0.04, 0.06]
-    [(name, everything)] = Values(columns()).parts([])
-    assert name == ""
-    assert len(everything["step"]) == N
+    assert values["step"][places == texts.index("PD")].tolist() == [0.02, 0.04, 0.06]
+    texts, places = values.parts([])
+    assert (texts, places.tolist()) == ([""], [0] * N)
 
 
 def test_where_keeps_runs_with_the_values():

@@ -56,6 +56,7 @@ GIVEN: Mapping[type[Any], Mapping[str, Any]] = {
         "--loop python": "python",
         "--scheduler tcp://here": "tcp://here",
         "--workers 3": 3,
+        "--points 9": 9,
         "--force": True,
     },
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tomllib
+
 import pytest
 
 from orchestrator.machine.errors import InputError, Refused
@@ -66,6 +68,19 @@ def test_content_of_a_file(tmp_path):
     assert study.sample == Sample(5, ranges, "sobol", 0)
     assert study.figures == {"map": {"kind": "bands", "x": "plant.eta0.z", "show": "lost"}}
     assert study.varied == (*study.vary, *ranges)
+
+
+def test_points_are_those_of_the_sample_or_of_each_range():
+    study = study_of("mine", tomllib.loads(TEXT))
+    assert study.with_points(16) == study_of("mine", tomllib.loads(TEXT.replace("n = 5", "n = 16")))
+    grid = TEXT.partition("[sample]")[0]
+    two = study_of("mine", tomllib.loads(grid)).with_points(2)
+    assert two == study_of("mine", tomllib.loads(grid.replace("n = 3", "n = 2")))
+    with pytest.raises(InputError, match="at most 1,000,000,000"):
+        study.with_points(10**10)
+    lists = study_of("mine", {"scenario": "fig4", "vary": {"plant.ell": [0.3, 0.4]}})
+    with pytest.raises(InputError, match="--points 7: mine has neither a sample nor a range"):
+        lists.with_points(7)
 
 
 def test_quoted_and_dotted_keys_are_the_same():
