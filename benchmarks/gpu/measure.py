@@ -162,7 +162,7 @@ def use_processor() -> None:
 def own_controller(folder: Path) -> str:
     """Write a controller, and return the path of its scenario."""
     scenario = folder / "my_law.toml"
-    with redirect_stdout(None):
+    with redirect_stdout(sys.stderr):
         auv_fmu(["new", "controller", "my_law", str(folder)])
     return str(scenario)
 
