@@ -25,6 +25,8 @@ from gymnasium.vector.utils import batch_space
 
 from orchestrator.cosim import PortName, System, read_component
 from orchestrator.machine.errors import InputError
+from orchestrator.program.card import Card
+from orchestrator.program.many import PROCESSOR, as_array
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.preparation import DEFAULT_STEP, load
 from orchestrator.runs.request import method_takes_keywords, option
@@ -58,6 +60,9 @@ class TrackingVectorOptions(TrackingOptions):
     """Arguments of :class:`TrackingVector`."""
 
     num_envs: int = option(1, "number of environments")
+    device: str | Card | None = option(
+        None, "`cuda` for a graphics card, as of `Simulations`; default: the processor"
+    )
 
 
 class _Task:
@@ -104,11 +109,23 @@ class _Task:
     def starts(self, generators: Sequence[np.random.Generator]) -> dict[str, np.ndarray]:
         """Draw the parameters of an episode from each generator."""
         moves = np.array([random.uniform(-self._moves, self._moves) for random in generators])
+        return self._starts(moves, np.array([random.integers(_SEEDS) for random in generators]))
+
+    def starts_together(self, generator: np.random.Generator, n: int) -> dict[str, np.ndarray]:
+        """Draw the parameters of n episodes from one generator."""
+        moves = generator.uniform(-self._moves, self._moves, (n, len(self._moves)))
+        return self._starts(moves, generator.integers(_SEEDS, size=n))
+
+    def _starts(self, moves: np.ndarray, seeds: np.ndarray) -> dict[str, np.ndarray]:
         starts = {
             name: value + move
             for (name, value), move in zip(self._start.items(), moves.T, strict=True)
         }
-        return starts | {self._seed: np.array([random.integers(_SEEDS) for random in generators])}
+        return starts | {self._seed: seeds}
+
+    def use(self, arrays: Any) -> None:
+        """Compute with the arrays of a package from now on."""
+        self._middle, self._half = map(arrays.asarray, (self._middle, self._half))
 
     def commands(self, actions: np.ndarray) -> np.ndarray:
         """Return the commands of actions within [-1, 1] [N, N.m]."""
@@ -223,10 +240,14 @@ class Tracking(gymnasium.Env[np.ndarray, np.ndarray]):  # type: ignore[misc]
 
 
 class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ignore[misc]
-    """Many :class:`Tracking` side by side, stepped on all cores.
+    """Many :class:`Tracking` side by side, stepped on all cores or on a graphics card.
 
     The numbers are those of `SyncVectorEnv`, with the seeds `seed`, `seed + 1` and so on: an
     environment whose episode has ended begins the next one in the following step.
+
+    On a card, observations, rewards and flags are arrays of CuPy, which torch and jax take without
+    a copy (DLPack), and actions may be theirs. One generator draws the starts of all episodes,
+    so a seed gives other episodes than on the processor.
     """
 
     metadata: ClassVar[dict[str, Any]] = {
@@ -246,14 +267,20 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
 
         """
         self._task, self.num_envs = _Task(options), options.num_envs
-        self._simulations = Simulations(self._task.system, self.num_envs)
+        self._simulations = Simulations(self._task.system, self.num_envs, device=options.device)
+        self._arrays: Any = self._simulations.arrays
+        with self._simulations.device:
+            self._task.use(self._arrays)
         self.single_observation_space = self._task.observations
         self.single_action_space = self._task.actions
         self.observation_space, self.action_space = (
             batch_space(space, self.num_envs)
             for space in (self._task.observations, self._task.actions)
         )
-        self._generators = [np.random.default_rng() for _ in range(self.num_envs)]
+        #: One for each environment, but on a card one for all.
+        self._draws_together = options.device not in PROCESSOR
+        n_generators = 1 if self._draws_together else self.num_envs
+        self._generators = [np.random.default_rng() for _ in range(n_generators)]
 
     def reset(
         self,
@@ -263,26 +290,34 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
     ) -> tuple[np.ndarray, dict[str, Any]]:
         """Begin an episode in each environment."""
         if seed is not None:
-            seeds = range(seed, seed + self.num_envs) if isinstance(seed, int) else seed
-            for i, each in zip(range(self.num_envs), seeds, strict=True):
+            n = len(self._generators)
+            seeds = range(seed, seed + n) if isinstance(seed, int) else seed
+            if len(seeds) != n:
+                raise InputError(f"seed: takes an integer or a list of {n}, not of {len(seeds)}")
+            for i, each in enumerate(seeds):
                 if each is not None:
                     self._generators[i], _ = np_random(each)
-        self._left = np.empty(self.num_envs, int)
-        self._seen = np.empty(self.observation_space.shape or ())
-        self._ended = np.zeros(self.num_envs, bool)
-        return self._seen, self._begin(~self._ended)
+        arrays = self._arrays
+        with self._simulations.device:
+            self._left = arrays.empty(self.num_envs, int)
+            self._seen = arrays.empty(self.observation_space.shape or ())
+            self._ended = arrays.zeros(self.num_envs, bool)
+            return self._seen, self._begin(~self._ended)
 
     def _begin(self, which: np.ndarray) -> dict[str, np.ndarray]:
         """Begin an episode in some environments, and return their parameters."""
-        numbers = np.flatnonzero(which)
-        starts = self._task.starts([self._generators[i] for i in numbers])
+        arrays, numbers = self._arrays, self._arrays.flatnonzero(which)
+        if self._draws_together:
+            starts = self._task.starts_together(self._generators[0], len(numbers))
+        else:
+            starts = self._task.starts([self._generators[i] for i in numbers])
         self._simulations.reset(numbers, starts)
-        self._left[which] = self._task.n_actions
-        self._seen[which] = self._simulations[self._task.seen][which]
+        self._left[numbers] = self._task.n_actions
+        self._seen[numbers] = self._simulations[self._task.seen][numbers]
         infos = {}
         for name, values in starts.items():
-            infos[name] = np.zeros(self.num_envs, values.dtype)
-            infos[name][which] = values
+            infos[name] = arrays.zeros(self.num_envs, values.dtype)
+            infos[name][numbers] = arrays.asarray(values)
             infos[f"_{name}"] = which
         return infos
 
@@ -291,19 +326,22 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         """Take an action in each environment, or begin an episode where the last one has ended."""
         task, simulations, ended = self._task, self._simulations, self._ended
-        actions = np.clip(actions, -1.0, 1.0)
-        if not ended.all():
-            simulations[task.command] = task.commands(actions)
-            simulations.step(task.every)
-        self._left -= 1
-        terminated, truncated = simulations.failed, self._left <= 0
-        self._seen = np.where(terminated[:, np.newaxis], self._seen, simulations[task.seen])
-        rewards = task.rewards(self._seen, actions)
-        infos = {}
-        if ended.any():
-            infos = self._begin(ended)
-            rewards[ended], terminated[ended], truncated[ended] = 0.0, False, False
-        self._ended = terminated | truncated
+        arrays: Any = self._arrays
+        with simulations.device:
+            actions = arrays.clip(as_array(arrays, actions), -1.0, 1.0)
+            if not ended.all():
+                simulations[task.command] = task.commands(actions)
+                simulations.step(task.every)
+            self._left -= 1
+            terminated, truncated = simulations.failed, self._left <= 0
+            failed, seen = terminated[:, np.newaxis], simulations[task.seen]
+            self._seen = arrays.where(failed, self._seen, seen)
+            rewards = task.rewards(self._seen, actions)
+            infos = {}
+            if ended.any():
+                infos = self._begin(ended)
+                rewards[ended], terminated[ended], truncated[ended] = 0.0, False, False
+            self._ended = terminated | truncated
         return self._seen, rewards, terminated, truncated, infos
 
 

@@ -11,7 +11,7 @@ typedef unsigned long long uint64_t;
 #define DBL_MAX 1.7976931348623157e308
 #define NAN __builtin_bit_cast(double, 0x7ff8000000000000ULL)
 #define INFINITY __builtin_bit_cast(double, 0x7ff0000000000000ULL)
-#define offsetof(type, member) __builtin_offsetof(type, member)
+#define offsetof(type, member) ((size_t)__INTADDR__(&((type *)0)->member))
 
 #endif
 
@@ -24,3 +24,7 @@ typedef unsigned long long uint64_t;
 #define UNROLLED _Pragma("unroll 1")
 #define WITHIN static __noinline__
 #endif
+
+/* `address_of() + T{}` is C's `&(T){}`, which lasts to the end of the whole expression here. */
+struct address_of {};
+template <typename T> WITHIN const T *operator+(address_of, const T &made) { return &made; }

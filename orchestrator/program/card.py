@@ -24,8 +24,8 @@ _THREADS = 128
 #: Share of a card's free memory that runs may take.
 _SHARE = 0.8
 
-#: Words of a generator.
-_GENERATOR = 624
+#: Words of a generator, of 32 bits.
+GENERATOR = 624
 
 #: Bytes of a run besides its memory and its numbers: times, steps, and whether it is refused.
 _REST = 64
@@ -138,8 +138,11 @@ def find_cards(instead: str) -> list[Card]:
         return [CudaCard(number) for number in range(cupy.cuda.runtime.getDeviceCount())]
     # CuPy without a driver, or for another version of CUDA, raises errors of its own.
     except Exception as error:
+        # The last line of CuPy's advice has the reason.
+        lines = [line.strip() for line in str(error).splitlines() if line.strip(" =")]
+        why = lines[-1] if lines else repr(error)
         raise InputError(
-            f"no graphics card of NVIDIA can be used: {reason(error)}; {instead}"
+            f"no graphics card of NVIDIA can be used: {why}; nvidia-smi shows the driver; {instead}"
         ) from error
 
 
@@ -195,6 +198,26 @@ class Cards:
     def __getstate__(self) -> dict[str, Any]:
         """Return the state without cards, which stay where they are."""
         return {"_instead": self._instead, "_cards": []}
+
+
+def find_card(name: str, instead: str) -> Card:
+    """Return the graphics card of a name: `cuda`, or `cuda:1` for the second one.
+
+    Args:
+        name: of the card.
+        instead: advice for a machine without one.
+
+    Raises:
+        InputError: there is none of this name, or its driver or CuPy is missing.
+
+    """
+    kind, _, digits = name.partition(":")
+    if kind != "cuda" or not (digits or "0").isdecimal():
+        raise InputError(f"device = {name!r}: use cpu, cuda or, for the second card, cuda:1")
+    cards, number = find_cards(instead), int(digits or "0")
+    if number >= len(cards):
+        raise InputError(f"device = {name!r}: this machine has {len(cards)} cards")
+    return cards[number]
 
 
 class CardProgram:
@@ -259,7 +282,7 @@ class _OnCard:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Make runs, as many at a time as its memory holds; some parameters are the same in all."""
         n_numbers = self._words + values.shape[1] + self._source.n_indices
-        size = 8 * n_numbers + 4 * _GENERATOR * self._generators + _REST
+        size = 8 * n_numbers + 4 * GENERATOR * self._generators + _REST
         with self._card:
             if self._same is not same:
                 self._steps = self._card.kernels(in_cuda(self._source, same).steps)
@@ -279,7 +302,7 @@ class _OnCard:
         varied = np.array([i for i in range(values.shape[1]) if i not in self._same], np.int32)
         start_times, steps, stop_times, full_steps, all_steps = map(arrays.asarray, grids)
         memory = arrays.empty((self._words, n), np.uint64)
-        words = arrays.empty(_GENERATOR * self._generators * n, np.uint32)
+        words = arrays.empty(GENERATOR * self._generators * n, np.uint32)
         refused = arrays.empty(n, np.int32)
         found = arrays.empty((self._source.n_indices, n))
         self._rest("begin_all")(

@@ -26,14 +26,20 @@ _HEAD, _KERNELS = (Path(__file__).with_name(name) for name in ("card.cuh", "kern
 
 _INCLUDE = re.compile(r"^#include .*\n", re.MULTILINE)
 
-#: A structure made within an expression.
+#: A structure made within an expression, and the address of one.
 _MADE = re.compile(r"\(([A-Z]\w*)\)\{")
+_ADDRESSED = re.compile(rf"&(?={_MADE.pattern})")
 
 #: The structure of all values of a run, and a declaration in it.
 _SIMULATION = re.compile(
     r"typedef struct \{\n(?P<members>(?:(?!typedef struct).)*?)\n\} simulation;", re.DOTALL
 )
 _DECLARATION = re.compile(r"^ +(\w+) ([^;]+);", re.MULTILINE)
+
+#: A structure that begins with parameters, which steps do not change.
+_WITH_PARAMETERS = re.compile(
+    r"typedef struct \{\n +\w+ parameters;(?:(?!typedef struct).)*?\n\} (\w+);", re.DOTALL
+)
 
 #: Types of members that are numbers.
 _NUMBERS = ("double", "int")
@@ -68,7 +74,8 @@ static __forceinline__ void seed_copy(generator *noise, uint32_t seed) {
     *noise = copy;
 }"""
 
-#: Passages about generators, which have their words, and for a card, where neighbours share memory.
+#: Passages about generators, which have their words, and for a card, where neighbours share memory:
+#: of each pair of words.
 _OWN = (
     "typedef uint32_t *word_places;",
     "uint32_t words[GENERATOR_WORDS];",
@@ -79,9 +86,9 @@ _SHARED = (
     """\
 struct word_places {
     uint32_t *first;
-    size_t apart; /* words between two of a generator */
-    uint32_t &operator[](size_t i) const { return first[i * apart]; }
-    word_places operator+(size_t i) const { return {first + i * apart, apart}; }
+    size_t apart; /* half the words from a pair to the next one */
+    uint32_t &operator[](size_t i) const { return first[(i & ~(size_t)1) * apart + (i & 1)]; }
+    word_places operator+(size_t i) const { return {first + i * apart, apart}; } /* an even i */
 };""",
     "word_places words;",
     _DRAWING,
@@ -99,10 +106,10 @@ static __forceinline__ void copy_in(void *to, const uint64_t from[], size_t n, s
     if (SIZE % 8) ((uint32_t *)to)[SIZE / 8 * 2] = (uint32_t)from[SIZE / 8 * n + i];
 }}
 
-template <int SIZE>
+template <int SIZE, int FIRST = 0>
 static __forceinline__ void copy_out(const void *from, uint64_t to[], size_t n, size_t i) {{
     UNROLLED
-    for (int w = 0; w < SIZE / 8; w++) to[w * n + i] = ((const uint64_t *)from)[w];
+    for (int w = FIRST / 8; w < SIZE / 8; w++) to[w * n + i] = ((const uint64_t *)from)[w];
     if (SIZE % 8) to[SIZE / 8 * n + i] = ((const uint32_t *)from)[SIZE / 8 * 2];
 }}
 
@@ -166,7 +173,7 @@ def in_cuda(source: Source, same: Mapping[int, float] = {}) -> CardText:
 
     """
     text = _INCLUDE.sub("", source.text)
-    text = _MADE.sub(r"\1{", text)
+    text = _MADE.sub(r"\1{", _ADDRESSED.sub("address_of() + ", text))
     text = text.replace("memset(it, 0, sizeof *it);", "")
     for own, shared in zip(_OWN, _SHARED, strict=True):
         text = text.replace(own, shared)
@@ -225,14 +232,17 @@ def _source(source: Source, text: str, same: Mapping[int, float], is_hot: bool) 
 def _memory(source: Source, members: list[_Member], same: Mapping[int, float]) -> str:
     """Return the functions that copy runs from memory and back."""
     calls: dict[str, list[str]] = {"copy_in": [], "copy_out": [], "steps": []}
+    with_parameters = {*_WITH_PARAMETERS.findall(source.text)}
     for each in members:
         size = f"sizeof(whole::{each.name})"
         place = f"memory + offsetof(whole, {each.name}) / 8 * n, n, i);"
         calls["copy_in"].append(f"    copy_in<{size}>(&it->{each.name}, {place}")
         calls["copy_out"].append(f"    copy_out<{size}>(&it->{each.name}, {place}")
         if each.name not in _UNCHANGED:
+            if each.type in with_parameters:
+                size += f", sizeof(whole::{each.name}.parameters)"
             calls["steps"].append(f"    copy_out<{size}>(&it->{each.name}, {place}")
-    apart = "{0}.words = {{words + {1} * GENERATOR_WORDS * n + i, n}};"
+    apart = "{0}.words = {{words + {1} * GENERATOR_WORDS * n + 2 * i, n}};"
     return _MEMORY.format(
         generators=len(source.noises),
         fetch="\n".join(calls["copy_in"]),

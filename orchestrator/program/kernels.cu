@@ -1,5 +1,6 @@
 /* Kernels of a program: each thread makes runs. Word w of run i is at memory[w * n + i], so that
- * neighbours read and write neighbouring words together. Their random words are arranged likewise.
+ * neighbours read and write neighbouring words together. Their random words, of half the length, are
+ * arranged likewise in pairs.
  *
  * The file is compiled twice: with HOT for the steps alone, whose values the compiler is to keep in
  * registers, and without for the rest.
@@ -42,17 +43,17 @@ extern "C" __global__ void sizes(int n, int found[]) {
 
 #if STEPPED
 
-/* Begins the runs whose numbers are given, with a row of parameters for each run. */
+/* Begins those whose numbers are given, as begin_all does. */
 extern "C" __global__ void begin_some(int m, uint64_t memory[], uint32_t words[], int n,
-                                      const int which[], const double parameters[],
-                                      double start_time, double step, double stop_time,
-                                      int steps) {
+                                      const int which[], const double same[], int n_varied,
+                                      const int varied[], const double values[], double start_time,
+                                      double step, double stop_time, int steps) {
     EACH(j, m) {
         const size_t i = which[j];
         RUN(it);
         it = simulation{};
         attach(&it, words, n, i);
-        begin_one(&it, parameters + i * SETTABLES, start_time, step, stop_time, steps);
+        begin_one(&it, same, n_varied, varied, values + j, m, start_time, step, stop_time, steps);
         store(&it, memory, n, i);
     }
 }
@@ -90,6 +91,7 @@ extern "C" __global__ void release_each(int n, uint64_t memory[], int input) {
     }
 }
 
+/* Gives places, as places does. */
 extern "C" __global__ void place(int n, size_t columns_at[], size_t settables_at[],
                                  size_t members_at[]) {
     EACH(i, n) { places(columns_at, settables_at, members_at); }

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from ctypes import (
+    CDLL,
     POINTER,
     c_char_p,
     c_double,
@@ -13,6 +14,7 @@ from ctypes import (
     memmove,
 )
 from dataclasses import replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -49,64 +51,104 @@ class Place(NamedTuple):
         return np.int32 if self.is_whole else np.float64
 
 
+class Places(NamedTuple):
+    """The places of the numbers of a simulation, in some memory.
+
+    Attributes:
+        columns: of all columns, by port.
+        settables: of all parameters and unconnected inputs.
+        members: of other members, in bytes.
+
+    """
+
+    columns: Mapping[PortName, Place]
+    settables: Mapping[PortName, Place]
+    members: Mapping[str, int]
+
+    def of(self, port: PortName) -> Place:
+        """Return the place of a column or a parameter."""
+        return self.columns[port] if port in self.columns else self.settables[port]
+
+
 class SteppedProgram:
-    """The program of a system for single steps.
+    """The program of a system for single steps, which is compiled for its first use.
 
     Attributes:
         plan: of the run, with its order.
-        library: the compiled functions.
-        size: bytes of a simulation.
-        columns: places of all columns, by port.
+        source: of the program.
+        columns: names of all columns.
         inputs: numbers of all inputs.
-        settables: numbers and places of all parameters and unconnected inputs.
-        members: places of other members of the simulation.
+        settables: numbers of all parameters and unconnected inputs.
 
     """
 
     def __init__(self, plan: Plan, *, is_quick: bool = False) -> None:
-        """Translate and compile the system of a plan.
+        """Translate the system of a plan.
 
         Args:
             plan: of the run.
             is_quick: if set, refusals have no reason.
 
         Raises:
-            InputError: it cannot be a program, or there is no compiler; the message says why.
+            InputError: it cannot be a program; the message says why.
 
         """
         text = Text(plan, definitions_of(plan.system), is_stepped=True, is_quick=is_quick)
-        program = Program(Source.of(text))
-        self.plan, self.library, self.size = text.plan, program.library, program.size
+        self.plan, self.source = text.plan, Source.of(text)
         self.passes, self.components = text.passes, text.components
-        self.inputs = text.inputs
-        library = self.library
-        for name, arguments in _ARGUMENTS.items():
-            getattr(library, name).argtypes = arguments
-        library.reason.restype = c_char_p
-        columns_at = np.zeros((len(text.columns), 2), dtype=np.uintp)
-        settables_at = np.zeros((len(text.parameters), 2), dtype=np.uintp)
-        members_at = np.zeros(len(_MEMBERS), dtype=np.uintp)
-        library.places(*(at.ctypes.data for at in (columns_at, settables_at, members_at)))
-        self.columns = {
-            name: Place(int(at), bool(whole))
-            for name, (at, whole) in zip(text.columns, columns_at, strict=True)
-        }
-        self.settables = {
-            name: (i, Place(int(at), bool(whole)))
-            for i, (name, (at, whole)) in enumerate(zip(text.parameters, settables_at, strict=True))
-        }
-        self.members = dict(zip(_MEMBERS, members_at.tolist(), strict=True))
+        self.columns, self.inputs = tuple(text.columns), text.inputs
+        self.settables = {name: i for i, name in enumerate(text.parameters)}
         bare = replace(plan.system, parameters={})
         #: Values of parameters and inputs that a system does not set.
         self._starts = np.array([float(text.start(name, bare)) for name in self.settables])
+
+    @cached_property
+    def library(self) -> CDLL:
+        """The compiled functions.
+
+        Raises:
+            InputError: there is no compiler.
+
+        """
+        library = Program(self.source).library
+        for name, arguments in _ARGUMENTS.items():
+            getattr(library, name).argtypes = arguments
+        library.reason.restype = c_char_p
+        return library
+
+    @property
+    def size(self) -> int:
+        """Bytes of a simulation."""
+        size: int = self.library.size_of_simulation()
+        return size
+
+    @cached_property
+    def places(self) -> Places:
+        """Places in the memory of the compiled functions."""
+        return self.places_by(lambda *at: self.library.places(*(each.ctypes.data for each in at)))
+
+    def places_by(self, give: Callable[..., object]) -> Places:
+        """Return places, which a function writes into three arrays."""
+        columns_at, settables_at = (
+            np.zeros((len(names), 2), np.uintp) for names in (self.columns, self.settables)
+        )
+        members_at = np.zeros(len(_MEMBERS), np.uintp)
+        give(columns_at, settables_at, members_at)
+        columns, settables = (
+            {
+                name: Place(int(at), bool(whole))
+                for name, (at, whole) in zip(names, found, strict=True)
+            }
+            for names, found in ((self.columns, columns_at), (self.settables, settables_at))
+        )
+        return Places(columns, settables, dict(zip(_MEMBERS, members_at.tolist(), strict=True)))
 
     def parameters(self, plan: Plan) -> np.ndarray:
         """Return the values of all parameters and unconnected inputs at the start of a plan."""
         values = self._starts.copy()
         for name, value in plan.system.parameters.items():
             if name in self.settables:
-                number, _ = self.settables[name]
-                values[number] = self.number(name, value)
+                values[self.settables[name]] = self.number(name, value)
         return values
 
     def number(self, name: PortName, value: Value) -> float:
@@ -139,7 +181,11 @@ _ARGUMENTS: Mapping[str, Sequence[Any]] = {
     "reason": (c_void_p,),
     "failure": (c_void_p, POINTER(c_int)),
     "places": (c_void_p, c_void_p, c_void_p),
-    "begin_all": (c_void_p, c_int, c_void_p, c_void_p, c_double, c_double, c_double, c_int),
+    "begin_all": (
+        c_void_p, c_int, c_void_p, c_void_p, c_int, c_void_p, c_void_p,
+        c_double, c_double, c_double, c_int,
+    ),
+    "release_all": (c_void_p, c_int, c_int),
     "advance_all": (c_void_p, c_int, c_void_p),
     "pass_all": (c_void_p, c_int),
     "tune_all": (c_void_p, c_int, c_int, c_void_p),
@@ -204,7 +250,7 @@ class ProgramSession:
         self._library = self._program.library
         self._memory = create_string_buffer(self._program.size)
         self._made, self._shown = (
-            c_int.from_buffer(self._memory, self._program.members[name])
+            c_int.from_buffer(self._memory, self._program.places.members[name])
             for name in ("made", "shown")
         )
         self._observers = observers
@@ -318,14 +364,14 @@ class ProgramSession:
 
         """
         self._present = None
-        number, _ = self._program.settables[target]
+        number = self._program.settables[target]
         if self._library.tune(self._memory, number, self._program.number(target, value)):
             time = self.experiment.time(self._made.value)
             raise InputError(self._program.refusal(self._memory, time))
 
     def parameter(self, name: PortName) -> Value:
         """Return the value of a parameter."""
-        _, (at, is_whole) = self._program.settables[name]
+        at, is_whole = self._program.places.settables[name]
         number: float = (c_int if is_whole else c_double).from_buffer(self._memory, at).value
         is_boolean = self.plan.system.variable(name).family == "Boolean"
         return bool(number) if is_boolean else number

@@ -62,20 +62,25 @@ static void go_on(simulation *it, int until) {
     if (!it->has_failed) it->has_failed = run(it, until, NULL) || come_up_to_date(it);
 }
 
-/* Begins one with parameters. */
-static void begin_one(simulation *it, const double parameters[], double start_time, double step,
+/* Begins one with parameters: `same` has all, and `varied` the places of those with values of its
+ * own, which are `apart`. */
+static void begin_one(simulation *it, const double same[], int n_varied, const int varied[],
+                      const double values[], size_t apart, double start_time, double step,
                       double stop_time, int steps) {
-    const int refused = begin(it, parameters, start_time, step, stop_time, steps, steps);
-    it->has_failed = refused;
+    double parameters[SETTABLES + 1];
+    for (int k = 0; k < SETTABLES; k++) parameters[k] = same[k];
+    for (int k = 0; k < n_varied; k++) parameters[varied[k]] = values[k * apart];
+    it->has_failed = begin(it, parameters, start_time, step, stop_time, steps, steps);
     go_on(it, 0);
 }
 
-/* Begins those whose numbers are given, with a row of parameters for each. */
-EXPORTED void begin_all(char *all, int n, const int which[], const double parameters[],
-                        double start_time, double step, double stop_time, int steps) {
-    for (int i = 0; i < n; i++) {
-        const double *own = parameters + (size_t)which[i] * SETTABLES;
-        begin_one(at(all, which[i]), own, start_time, step, stop_time, steps);
+/* Begins those whose numbers are given: value k of the j-th is values[k * m + j]. */
+EXPORTED void begin_all(char *all, int m, const int which[], const double same[], int n_varied,
+                        const int varied[], const double values[], double start_time, double step,
+                        double stop_time, int steps) {
+    for (int j = 0; j < m; j++) {
+        begin_one(at(all, which[j]), same, n_varied, varied, values + j, (size_t)m, start_time, step,
+                  stop_time, steps);
     }
 }
 
@@ -86,6 +91,11 @@ EXPORTED void advance_all(char *all, int n, const int until[]) {
 /* Brings all up to date after a change. */
 EXPORTED void pass_all(char *all, int n) {
     for (int i = 0; i < n; i++) go_on(at(all, i), 0);
+}
+
+/* Lets an input of each take again what feeds it. */
+EXPORTED void release_all(char *all, int n, int input) {
+    for (int i = 0; i < n; i++) release(at(all, i), input);
 }
 
 /* Sets a parameter of each. Returns how many refuse it. */

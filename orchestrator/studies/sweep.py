@@ -383,6 +383,8 @@ def _engine(
         return FmuEngine(prepared, means.loop, own)
     runners: Runners = Cards(_INSTEAD) if name == GPU else PROCESSOR
     engine, is_here = BatchEngine(_systems(prepared), own, runners=runners), means.scheduler is None
+    if is_here:
+        runners.names  # noqa: B018 - finds the cards
     for scenario, run in prepared.items():
         experiment = run.experiment
         engine.prepare(

@@ -12,13 +12,16 @@ import pyarrow.parquet as pq
 import pytest
 
 from orchestrator import sweep
+from orchestrator.commands.main import main
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
 from orchestrator.program import card
 from orchestrator.program.card import CardProgram, Cards, find_cards
 from orchestrator.program.cuda import in_cuda
 from orchestrator.program.library import Source
-from orchestrator.runs.preparation import load
+from orchestrator.program.session import stepped_program
+from orchestrator.runs.preparation import load, prepare_options
+from orchestrator.runs.request import SystemOptions
 from orchestrator.runs.scenario import names
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.columns import Outcomes, Point, Points
@@ -92,6 +95,14 @@ def test_programs_are_cuda(scenario):
 
 
 @pytest.mark.skipif(library() is None, reason="NVRTC is not installed")
+def test_programs_for_single_steps_are_cuda():
+    options = SystemOptions("fig4", {})
+    program = stepped_program(prepare_options(options, is_open=True).plan, is_quick=True)
+    for text in in_cuda(program.source):
+        assert compiled(text, f"-arch={ARCHITECTURES[1]}", "--Ofast-compile=max")
+
+
+@pytest.mark.skipif(library() is None, reason="NVRTC is not installed")
 def test_values_of_steps_are_in_registers():
     _, cards = engine("fig4")
     code = compiled(in_cuda(cards.source).steps, "-arch=compute_90").decode()
@@ -107,6 +118,15 @@ def test_runs_equal_the_processor(scenario):
     expected = joined(BatchEngine({scenario: load(scenario, KIND)}), points)
     assert np.isfinite(expected.indices).any()
     assert_same(joined(made, points), expected)
+
+
+def test_runs_of_an_own_controller_equal_the_processor(tmp_path, monkeypatch):
+    """It passes the address of a matrix that it makes in an expression, as C allows."""
+    monkeypatch.chdir(tmp_path)
+    main(["new", "controller", "law", "."])
+    test_runs_equal_the_processor("law.toml")
+    _, cards = engine("law.toml")
+    assert "&(Matrix" in cards.source.text
 
 
 def test_studies_equal_the_processor(tmp_path, monkeypatch):

@@ -21,9 +21,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from auv_fmu import Result, Simulation, SimulationFailed, Simulations, load, simulate
-from orchestrator.cosim import System
+from orchestrator.commands.main import main
+from orchestrator.cosim import Connection, Linear, PortName, System, read_component
 from orchestrator.machine.compilers import machines_compiler
 from support.mixed import Shape, build
+from support.processor_card import ProcessorCard
 from support.tiers import slow
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -381,15 +383,28 @@ def test_threads_step_simulations_at_the_same_time():
 # Many at once
 
 
-def test_each_of_many_is_a_simulation_of_its_own():
+#: The processor, and the kernels of a card.
+DEVICES = pytest.mark.parametrize("device", [None, ProcessorCard()], ids=["processor", "card"])
+
+
+class Lent:
+    """An array of another package, which has DLPack and nothing else."""
+
+    def __init__(self, array: np.ndarray) -> None:
+        self.__dlpack__, self.__dlpack_device__ = array.__dlpack__, array.__dlpack_device__
+
+
+@DEVICES
+def test_each_of_many_is_a_simulation_of_its_own(device: Any):
     n, random = 300, np.random.default_rng(1)
-    d11 = random.uniform(20.0, 60.0, n)
+    d11, seeds = random.uniform(20.0, 60.0, n), np.arange(n)
     starts = np.zeros((n, 6))
     starts[:, :3] = random.uniform(-2.0, 2.0, (n, 3))
     forces = random.uniform(-20.0, 20.0, n)
-    sims = Simulations("fig4", n, {"plant.d11": d11, "plant.eta0": starts}, threads=2)
+    each = {"plant.d11": d11, "plant.eta0": starts, "plant.noise.seed": seeds}
+    sims = Simulations("fig4", n, each, threads=2, device=device)
     sims.run(until=0.4)
-    sims["plant.tau.u"] = forces
+    sims["plant.tau.u"] = Lent(forces)
     sims["controller.k_d"] = 40.0
     sims.step(5)
     del sims["plant.tau.u"]
@@ -397,7 +412,7 @@ def test_each_of_many_is_a_simulation_of_its_own():
     sims.step()
     assert sims.time[[0, 7]].tolist() == [26 * H, H]
     for i in (0, 7, n - 1):
-        own = {"plant.d11": d11[i], "plant.eta0": starts[i].tolist()}
+        own = {name: values[i].tolist() for name, values in each.items()}
         with pytest.warns(UserWarning, match="another vehicle"):
             sim = Simulation("fig4", own)
         with sim:
@@ -415,25 +430,76 @@ def test_each_of_many_is_a_simulation_of_its_own():
             assert sims["plant.d11"][i] == sim["plant.d11"]
 
 
-def test_arrays_are_views_and_states_can_be_assigned():
-    sims = Simulations("fig4", 4)
+@DEVICES
+def test_arrays_are_views_and_states_can_be_assigned(device: Any):
+    sims = Simulations("fig4", 4, {"plant.noise.seed": np.arange(4)}, device=device)
     eta, saved = sims["plant.eta"], sims.states.copy()
     start = eta.copy()
     sims.step(10)
-    assert np.shares_memory(eta, sims.states) and (eta != start).any()
-    assert np.shares_memory(sims["controller.k_d"], sims.states)
-    with pytest.raises(ValueError, match="read-only"):
-        eta[:] = 0.0
+    ends = sims["plant.y"].copy()
+    for name in ("plant.eta", "controller.k_d", "plant.noise.seed"):
+        assert np.shares_memory(sims[name], sims.states)
+    assert (eta != start).any()
+    if device is None:
+        with pytest.raises(ValueError, match="read-only"):
+            eta[:] = 0.0
     sims.states[:] = saved
     np.testing.assert_array_equal(eta, start)
+    sims.step(10)
+    np.testing.assert_array_equal(sims["plant.y"], ends)
     sims["plant.tau.u"] = [1.0, 2.0, 3.0, 4.0]
     sims.step()
     sims.states[:] = sims.states[2]
+    sims.step(50)
     assert sims["plant.tau.u"].tolist() == [3.0] * 4
+    assert len(np.unique(sims["plant.y"], axis=0)) == 1
 
 
-def test_one_of_many_may_fail_and_begin_again():
-    sims = Simulations("fig4", 3, {"plant.d11": np.array([30.0, 1e4, 30.0])})
+@DEVICES
+def test_vehicles_of_a_fleet_have_their_noise_and_connections(native: Path, device: Any):
+    names, plant = ("one.plant", "two.plant"), native / "AuvPlant.fmu"
+    wire = Connection(
+        PortName("one.plant", "nu.u"), PortName("two.plant", "water.x"), Linear(0.5, 0.25)
+    )
+    fleet = System("fleet", {name: read_component(name, plant) for name in names}, (wire,))
+    seeds = {f"{name}.noise.seed": np.arange(3) + 3 * i for i, name in enumerate(names)}
+    sims = Simulations(fleet, 3, seeds, device=device)
+    # Generators make new words after 312 numbers.
+    sims.step(120)
+    speeds = np.array([1.0, 2.0, 3.0])
+    sims["one.plant.nu.u"] = speeds
+    sims.step()
+    assert sims["two.plant.water.x"].tolist() == (0.5 * speeds + 0.25).tolist()
+    for i in range(3):
+        with Simulation(fleet, {name: values[i] for name, values in seeds.items()}) as sim:
+            sim.run(until=120 * H)
+            sim["one.plant.nu.u"] = speeds[i]
+            sim.step()
+            for name in ("one.plant.y", "two.plant.y", "two.plant.eta"):
+                assert sims[name][i].tolist() == sim[name].tolist(), name
+
+
+def test_of_many_none_takes_a_parameter_that_a_component_refuses(workplace: Path):
+    script = Path(__file__).parents[2] / "examples" / "notch_filter" / "notch_filter.py"
+    (workplace / script.name).write_text(script.read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["build", script.name, "--kind", "python", "--out", "."]) == 0
+    with Simulation("NotchFilter.fmu", {"NotchFilter.f0": 4.0}) as sim:
+        for _ in range(5):
+            sim.step()
+        wanted = sim["NotchFilter.y"]
+    for device in (None, ProcessorCard()):
+        sims = Simulations("NotchFilter.fmu", 3, device=device)
+        sims["NotchFilter.f0"] = [3.0, 4.0, 5.0]
+        with pytest.raises(ValueError, match=r"NotchFilter\.f0: the component refuses"):
+            sims["NotchFilter.f0"] = [6.0, 25.0, 7.0]
+        assert sims["NotchFilter.f0"].tolist() == [3.0, 4.0, 5.0]
+        sims.step(5)
+        assert sims["NotchFilter.y"][1] == wanted
+
+
+@DEVICES
+def test_one_of_many_may_fail_and_begin_again(device: Any):
+    sims = Simulations("fig4", 3, {"plant.d11": np.array([30.0, 1e4, 30.0])}, device=device)
     sims.run(until=1.0)
     assert sims.failed.tolist() == [False, True, False]
     # simulate stops there, too.
@@ -445,15 +511,21 @@ def test_one_of_many_may_fail_and_begin_again():
     assert sims["plant.eta"][1].tolist() == sims["plant.eta"][0].tolist()
 
 
-def test_many_refuse_what_one_refuses():
+@DEVICES
+def test_many_refuse_what_one_refuses(device: Any):
     for parameters, why in (
         ({"plant.d11": np.array([1.0, -1.0])}, "plant.d11 = -1"),
         ({"plant.d11": np.array([1.0, np.nan])}, "must be finite"),
         ({"plant.d12": np.array([1.0, 1.0])}, "no port or parameter 'plant.d12'"),
+        ({"plant.noise.seed": np.array([1, 2**31])}, "plant.noise.seed = 2147483648"),
+        (
+            {"plant.tau_min.u": np.array([-1.0, 0.0]), "plant.tau_max.u": np.array([1.0, 0.0])},
+            "simulation 1: plant: tau_min.u = 0 must be below",
+        ),
     ):
         with pytest.raises(ValueError, match=re.escape(why)):
-            Simulations("fig4", 2, parameters)
-    sims = Simulations("fig4", 2)
+            Simulations("fig4", 2, parameters, device=device)
+    sims = Simulations("fig4", 2, device=device)
     for name, values, why in (
         ("plant.tau.u", [1.0, 2.0, 3.0], "takes an array of shape (2,), not (3,)"),
         ("plant.tau", np.zeros((2, 2)), "takes an array of shape (2, 3), not (2, 2)"),
@@ -466,3 +538,13 @@ def test_many_refuse_what_one_refuses():
         sims.run(until=0.5 * H)
     with pytest.raises(ValueError, match="has events"):
         Simulations("fault-sensor", 2)
+
+
+def test_a_device_that_cannot_be_had_is_refused():
+    for device, why in (
+        ("gpu", "device = 'gpu': use cpu, cuda or, for the second card, cuda:1"),
+        ("cuda:99", r"without device, the processor does the same|device = 'cuda:99'"),
+        (ProcessorCard(memory=2**20), r"n = 1000: this processor has memory for \d+"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            Simulations("fig4", 1000, device=device)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from auv_fmu import Simulation
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.errors import InputError
+from support.processor_card import ProcessorCard
 from support.texts import mentions
 
 gymnasium = pytest.importorskip("gymnasium")
@@ -72,6 +73,36 @@ def test_vector_has_the_numbers_of_single_environments(parameters, ending):
             assert all(map(same, some, others))
             ends += some[2 if ending == "terminated" else 3].sum()
     assert ends >= 18
+
+
+@pytest.mark.parametrize("ending", [{}, {"planner.tau_d.q": 8.0, "planner.eta0.theta": 1.45}])
+def test_on_a_card_environments_have_the_numbers_of_the_processor(ending):
+    """From starts without chance, over the ends of episodes."""
+    options = {"duration": 1.0, "every": 4, "offset": 0.0, "turn": 0.0}
+    parameters = {"plant.noise.std": 0.0, **ending}
+    ours, theirs = (
+        gymnasium.make_vec(ID, 3, parameters=parameters, device=device, **options)
+        for device in (ProcessorCard(), None)
+    )
+    random, ends = np.random.default_rng(1), 0
+    assert same(ours.reset(seed=1)[0], theirs.reset(seed=2)[0])
+    for _ in range(30):
+        actions = random.uniform(-1.2, 1.2, (3, 3)).astype(np.float32)
+        some, others = (envs.step(actions) for envs in (ours, theirs))
+        assert all(map(same, some[:4], others[:4])) and some[4].keys() == others[4].keys()
+        ends += some[2 if ending else 3].sum()
+    assert ends >= 6
+
+
+def test_on_a_card_one_generator_draws_all_starts():
+    envs = gymnasium.make_vec(ID, 100, device=ProcessorCard())
+    (seen, starts), (again, _) = envs.reset(seed=1), envs.reset(seed=1)
+    assert same(seen, again) and len(np.unique(seen, axis=0)) == 100
+    moved = np.transpose([starts[f"plant.eta0.{axis}"] for axis in ("x", "y", "z", "psi")])
+    assert (abs(moved - (2.0, 6.0, 0.0, 0.0)) <= (2.0, 2.0, 2.0, 0.5)).all()
+    assert len(np.unique(starts["plant.noise.seed"])) == 100
+    with pytest.raises(InputError, match="takes an integer or a list of 1, not of 2"):
+        envs.reset(seed=[1, 2])
 
 
 def test_vehicle_steered_by_hand_gives_the_same_observations_and_rewards():

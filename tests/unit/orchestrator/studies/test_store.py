@@ -6,6 +6,7 @@ import json
 import signal
 import subprocess
 import sys
+import tracemalloc
 from collections.abc import Mapping
 from itertools import chain, pairwise
 from pathlib import Path
@@ -15,12 +16,12 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from orchestrator.machine.errors import InputError
 from orchestrator.studies import store as store_module
-from orchestrator.studies.columns import Case, Outcome, Outcomes, Points
+from orchestrator.studies.columns import Case, Outcome, Outcomes, Points, Texts
 from orchestrator.studies.store import StudyResult, open_store, read_study_record
 from orchestrator.vehicle.indices import index_columns
 from support.machine import contents, eventually
@@ -105,6 +106,7 @@ def test_table_has_all_runs_in_their_order_to_the_last_bit(tmp_path):
     assert rows[0] | {k: v for k, v in odd.items() if k != "late_error"} == rows[0]
 
 
+@settings(max_examples=max(settings.default.max_examples // 5, 5))
 @given(st.permutations(range(60)), st.sets(st.integers(1, 59), max_size=12))
 def test_blocks_come_in_any_order_and_may_overlap(numbers, cuts):
     """Refused runs that are repeated make such blocks; only some are in memory."""
@@ -117,6 +119,29 @@ def test_blocks_come_in_any_order_and_may_overlap(numbers, cuts):
         table = parquet.read_table(Path(folder, "runs.parquet"))
     assert table["run"].to_pylist() == [*range(60)]
     assert table["late_error"].to_pylist() == [0.3 * i for i in range(60)]
+
+
+def test_memory_does_not_grow_with_the_number_of_runs(tmp_path, monkeypatch):
+    """Neither while runs are added and published nor while they are counted."""
+    monkeypatch.setattr(store_module, "_ROWS", size := 500)
+
+    def peak(blocks: int) -> int:
+        folder, record = tmp_path / str(blocks), RECORD | {"runs": size * blocks}
+        tracemalloc.start()
+        with open_store(folder, record, index_columns()) as unfinished:
+            for numbers in unfinished.missing(size * blocks).blocks(size):
+                values = np.full((size, len(index_columns())), 0.1)
+                texts = Texts.where(numbers % 7 == 0, "chattering")
+                made = Outcomes(numbers, index_columns(), values, Texts.of([None] * size), texts)
+                unfinished.add(made)
+            unfinished.publish(Toys(size * blocks))
+        assert StudyResult(folder).cautions["chattering"] == -(-size * blocks // 7)
+        largest = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return largest
+
+    peak(1)
+    assert peak(24) < 1.1 * peak(6)
 
 
 def test_result_gives_columns_and_suggests_names(tmp_path):
