@@ -5,8 +5,8 @@ The parts, in this order, each of which prints as it goes:
 - `compile`: time to the first runs of Fig. 4, with an empty cache of compiled programs and again.
 - `checks`: indices by `gpu` and by `batch`, of ready studies and of other scenarios. Deviations are
   relative to the larger of 1 and the value. A run counts as chaotic if moving its start by 1e-12 m
-  moves an index by more than 1e-9 on the processor alone: rounding errors grow there.
-- `random`: normal numbers on the card and those of Python's `random`.
+  moves an index by more than 1e-9 on the processor, too: rounding errors grow there.
+- `random`: normal numbers on the card, beside Python's `random`.
 - `speed`: steps a second by `gpu`, with all indices, and by `batch` on all cores.
 - `stepping`: steps a second of `Simulations`, one step a call.
 - `study`: a large study of Fig. 4 with its table, and where its time goes.
@@ -54,8 +54,8 @@ from orchestrator.studies.study import read_study, ready_studies, study_of
 from orchestrator.studies.sweep import making_runs
 from orchestrator.vehicle.signals import loops_of
 
-#: The scenario of a controller of one's own, which the script makes.
-OWN = "own controller"
+#: The scenario of a new controller, which the script makes.
+OWN = "new controller"
 
 #: Scenarios that are checked besides ready studies, and those that are timed.
 CHECKED = ("fig4", "fig5-pd", "sea", "remus", "formation-v", "path", OWN)
@@ -70,7 +70,7 @@ CHECKED_TIME, TIMED_TIME, STEP = 60.0, 10.0, 0.02
 #: Largest distance of the starts from the scenario's [m].
 AWAY = 5.0
 
-#: How far a start is moved [m], and from which deviation on the run counts as chaotic.
+#: Distance by which a start is moved [m], and the deviation from which a run counts as chaotic.
 MOVED, CHAOTIC = 1e-12, 1e-9
 
 #: Runs in a block on the processor, so that the time of a measurement is kept.
@@ -85,7 +85,7 @@ DRAWN_STEPS = 300
 #: Width of the hidden layers of the policy, and an action's share of the limits.
 HIDDEN, SHARE = 64, 0.1
 
-#: Where results go, by part.
+#: Results by part, each of which has rows.
 Results = dict[str, list[dict[str, Any]]]
 
 
@@ -497,7 +497,7 @@ def measure_policy(report: Report, given: argparse.Namespace) -> None:
 
 
 def policy_of(n_seen: int, n_actions: int, seen: Any) -> tuple[Callable[[Any], Any], str]:
-    """Return a policy and the package that computes it: torch, or that of the observations."""
+    """Return a policy and the package that computes it: torch, or CuPy or numpy."""
     if find_spec("torch") and not isinstance(seen, np.ndarray):
         import torch  # noqa: PLC0415
 

@@ -2,8 +2,8 @@
 
 FOLDER then holds wheels of auv-fmu, with its FMUs for this platform, and of the packages that it
 needs; `run.sh`, which installs them without a network, beside what the machine has; and
-`measure.py`. Copy it to the machine, and start `sh run.sh`. What it is given is given to
-`measure.py`, so `sh run.sh --processor` tries everything without a card.
+`measure.py`. Copy the folder to the machine, and start `sh run.sh`, which takes the options of
+`measure.py`; with `--processor` it tries everything without a card.
 
 A card needs CuPy, which is not carried: the machine has the one for its driver.
 """

@@ -306,7 +306,8 @@ class StudyFile(TomlTable):
     )
     engine: Annotated[str, OneOf(ENGINES)] = entry(
         "What makes the runs: the FMUs, or one compiled program of the system, which takes "
-        "components in the language of equations and gives the same numbers.",
+        "components in the language of equations and gives the same numbers, or that program on "
+        "graphics cards.",
         f"`{ENGINES[0]}`",
     )
     stop_time: float | StopTimeTable = entry(

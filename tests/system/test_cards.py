@@ -120,7 +120,7 @@ def test_runs_equal_the_processor(scenario):
     assert_same(joined(made, points), expected)
 
 
-def test_runs_of_an_own_controller_equal_the_processor(tmp_path, monkeypatch):
+def test_runs_of_a_new_controller_equal_the_processor(tmp_path, monkeypatch):
     """It passes the address of a matrix that it makes in an expression, as C allows."""
     monkeypatch.chdir(tmp_path)
     main(["new", "controller", "law", "."])
