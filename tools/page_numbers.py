@@ -7,6 +7,7 @@
 `remus`        docs/explanation/remus.md: changes of `remus` and `remus-pd`, and steady turns
 `networks`     docs/tutorials/your-own-component.md: deviation of networks from onnxruntime
 `gains`        the best gains under a limit of the commands, in docs/explanation/ready-studies.md
+`roundings`    docs/explanation/batch.md: how far the indices of `batch` and `gpu` may be apart
 `studies`      the numbers below the figures of that page, from finished studies in folders
 `benchmarks`   runs the commands of the files in benchmarks/results, and writes their output there
 =============  ====================================================================================
@@ -26,11 +27,13 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import date
 from itertools import pairwise, product
 from math import ceil, exp, log
 from pathlib import Path
+from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -47,21 +50,29 @@ from auv_fmu.remus.remus100 import Parameters, RemusState, accelerations, tail_f
 from fmus.ports.port import H_MAX
 from orchestrator import simulate
 from orchestrator.cosim import PortName, System, Table
+from orchestrator.machine.compilers import ROUNDED
 from orchestrator.machine.workers import cores
 from orchestrator.paper.claims import total_variation_until
 from orchestrator.paper.page import numbers, table
 from orchestrator.program.components import definitions_of
+from orchestrator.program.library import Processor, Program, Source
 from orchestrator.runs.networks import component_text, read_network
 from orchestrator.runs.preparation import load_scenario, prepare_request, with_companion
 from orchestrator.runs.request import Request
 from orchestrator.runs.scenario import names, read_scenario
 from orchestrator.studies.batch_engine import BatchEngine
-from orchestrator.studies.columns import Outcomes, Point
+from orchestrator.studies.columns import Outcomes, Point, Texts
 from orchestrator.studies.engine import outcomes_of
+from orchestrator.studies.space import Space
 from orchestrator.studies.store import StudyResult
-from orchestrator.studies.study import BATCH, GPU, EngineName, read_study
+from orchestrator.studies.study import BATCH, GPU, EngineName, read_study, ready_studies
 from orchestrator.studies.sweep import Means, Ready, making_runs, prepare_study
-from orchestrator.vehicle.indices import SMALLEST_DISTANCE_LABEL, smallest_distances
+from orchestrator.vehicle.indices import INDICES as EVERY
+from orchestrator.vehicle.indices import (
+    SMALLEST_DISTANCE_LABEL,
+    prefixed,
+    smallest_distances,
+)
 from orchestrator.vehicle.signals import (
     ACTUATORS,
     AXES,
@@ -799,6 +810,171 @@ def candidates(ready: Ready, place: int, values: Mapping[str, np.ndarray]) -> di
     return dict(zip(outcomes.columns, rows.T, strict=True))
 
 
+# Equality of the engines `batch` and `gpu`
+
+#: Redefines functions so that a result is moved by one unit in the last place, up, down or not at
+#: all, by a hash of its bits and of a seed. Libraries give 0 and 1 exactly, and none exceeds them.
+MOVED = """\
+#include <math.h>
+#include <stdint.h>
+#include <string.h>
+
+static double moved(double x) {{
+    uint64_t bits, mixed;
+    memcpy(&bits, &x, sizeof bits);
+    mixed = bits + {seed}u * 0x9e3779b97f4a7c15u;
+    mixed = (mixed ^ mixed >> 30) * 0xbf58476d1ce4e5b9u;
+    mixed = (mixed ^ mixed >> 27) * 0x94d049bb133111ebu;
+    mixed ^= mixed >> 31;
+    if (x == 0.0 || fabs(x) == 1.0 || !isfinite(x)) return x;
+    bits = bits + mixed % 3 - 1;
+    memcpy(&x, &bits, sizeof bits);
+    return x;
+}}
+
+{functions}
+"""
+
+#: Seeds of the roundings; how far a start is moved [m]; and the difference that counts as one.
+ROUNDINGS, NUDGE, APART = (1, 2, 3), 1e-12, 1e-6
+
+#: Indices that count steps: they jump by whole steps.
+COUNTS = ("saturated_fraction", "time_to_reach", "time_to_settle")
+
+#: Share of saturated steps above which a run without a caution may be chaotic, too.
+OFTEN = 0.05
+
+#: An engine, and the runs that it is to make.
+Job = tuple[BatchEngine, Sequence[Point]]
+
+
+class MovedFunctions(Processor):
+    """The processor, with functions whose results are moved in the last place.
+
+    Attributes:
+        head: what texts in C begin with.
+
+    """
+
+    def __init__(self, seed: int) -> None:
+        """Choose the roundings."""
+        functions = (f"#define {name}(...) moved({name}(__VA_ARGS__))" for name in ROUNDED)
+        self.head = MOVED.format(seed=seed, functions="\n".join(functions))
+
+    def __call__(self, source: Source) -> Program:
+        """Return a compiled program."""
+        return super().__call__(replace(source, text=self.head + source.text))
+
+
+def roundings(*studies: str, n: int = 200) -> None:
+    """Compare n random runs of ready studies with the same by functions of other roundings.
+
+    A run differs if an index that counts no steps is more than 1e-6 apart, relative to values above
+    1. It is chaotic if a start moved by 1e-12 m does that, too. One that differs and is not chaotic
+    is made again without friction. Suspect is a run with a caution, or with more than 5 % of its
+    steps saturated.
+    """
+    rows = [rounded_study(name, n) for name in studies or ready_studies()]
+    show([*rows[0]], [[*row.values()] for row in rows])
+
+
+def rounded_study(name: str, n: int) -> dict[str, str]:
+    """Print the differences of a study by index, and return its row in the table of all."""
+    study = read_study(name)
+    loaded = {scenario: load_scenario(scenario) for scenario in study.scenario}
+    systems = {scenario: system for scenario, (_, system) in loaded.items()}
+    space, loops = Space(study, loaded), loops_of(next(iter(systems.values())))
+    points = [space[number] for number in sorted(Random(n).sample(range(len(space)), n))]
+    own = BatchEngine(systems)
+    others = [BatchEngine(systems, runners=MovedFunctions(seed)) for seed in ROUNDINGS]
+
+    x, smooth = loops[0].start[0], {f"{loop.disturbance}.A_f": 0.0 for loop in loops}
+    nudged = [changed(point, {x: start_of(own, point, x) + NUDGE}) for point in points]
+    made, started, *moved = outcomes_of_jobs(
+        [(own, points), (own, nudged), *((other, points) for other in others)]
+    )
+    index_of = {
+        f"{prefix}{column}": index.name
+        for _, prefix in prefixed(loops)
+        for index in EVERY
+        for column in index.columns
+    }
+    indices = np.array([index_of.get(column, column) for column in made.columns])
+    apart = np.array([index_differences(each, made) for each in moved])
+    rows = []
+    for index in dict.fromkeys(indices.tolist()):
+        each = apart[:, :, indices == index]
+        beyond = f"{100 * (each > APART).any(axis=(0, 2)).mean():.3g} %"
+        rows.append([index, power(float(np.median(each))), power(each.max()), beyond])
+    print(f"\n{name}")
+    show(["index", "median", "largest", f"runs above {APART:g}"], rows)
+
+    continuous = ~np.isin(indices, COUNTS)
+    size = apart[:, :, continuous].max(axis=(0, 2))
+    differs = size > APART
+    chaotic = (index_differences(started, made)[:, continuous] > APART).any(axis=1)
+    warned = np.array([caution is not None for caution in made.cautions.each()])
+    saturated = (made.indices[:, indices == "saturated_fraction"] > OFTEN).any(axis=1)
+    ties = [changed(points[i], smooth) for i in np.flatnonzero(differs & ~chaotic)]
+    again = outcomes_of_jobs([(engine, ties) for engine in (own, *others)])
+    even, *uneven = (each.arranged(made.columns) for each in again)
+    still = np.array([index_differences(each, even)[:, continuous] > APART for each in uneven])
+    return {
+        "study": f"`{name}`",
+        "runs": str(n),
+        "median": power(float(np.median(size))),
+        "largest": power(size.max()),
+        "differ": str(differs.sum()),
+        "largest of the others": power(size[~differs].max(initial=0.0)),
+        "chaotic": str(chaotic.sum()),
+        "differ and chaotic": str((differs & chaotic).sum()),
+        "with a caution": str((differs & chaotic & warned).sum()),
+        "suspect": str((warned | saturated).sum()),
+        "chaotic, not suspect": str((chaotic & ~warned & ~saturated).sum()),
+        "differ, not chaotic": str(len(ties)),
+        "of these without friction": str(still.any(axis=(0, 2)).sum()),
+        "other failures": str(max(other_texts(each.failures, made.failures) for each in moved)),
+        "other cautions": str(max(other_texts(each.cautions, made.cautions) for each in moved)),
+    }
+
+
+def changed(point: Point, values: Values) -> Point:
+    """A run with some values changed."""
+    return point._replace(parameters={**point.parameters, **values})
+
+
+def start_of(engine: BatchEngine, point: Point, name: str) -> float:
+    """The value of a parameter in a run."""
+    value = engine.value(point, name)
+    assert isinstance(value, float)
+    return value
+
+
+def outcomes_of_jobs(jobs: Sequence[Job]) -> list[Outcomes]:
+    """The outcomes of each job; jobs are done at the same time."""
+    with ThreadPoolExecutor() as pool:
+        return [*pool.map(lambda job: Outcomes.of(outcomes_of(*job)), jobs)]
+
+
+def index_differences(outcomes: Outcomes, expected: Outcomes) -> np.ndarray:
+    """Differences of indices, relative to values above 1; inf if only one of two is missing."""
+    values, own = outcomes.arranged(expected.columns).indices, expected.indices
+    apart: np.ndarray = np.abs(values - own) / np.maximum(1.0, np.abs(own))
+    apart[np.isnan(apart)] = np.inf
+    apart[np.isnan(values) & np.isnan(own)] = 0.0
+    return apart
+
+
+def other_texts(texts: Texts, expected: Texts) -> int:
+    """Number of runs with another text."""
+    return sum(a != b for a, b in zip(texts.each(), expected.each(), strict=True))
+
+
+def power(x: float) -> str:
+    """A number with one digit and an exponent."""
+    return "one is missing" if x == np.inf else f"{x:.0e}" if x else "0"
+
+
 # Studies
 
 #: Prefixes of column names that do not distinguish columns.
@@ -965,7 +1141,17 @@ def machine() -> str:
 #: Functions by name.
 PAGES: Mapping[str, Callable[..., int | None]] = {
     function.__name__: function
-    for function in (accuracy, noise, seeds, remus, networks, gains, studies, benchmarks)
+    for function in (
+        accuracy,
+        noise,
+        seeds,
+        remus,
+        networks,
+        gains,
+        roundings,
+        studies,
+        benchmarks,
+    )
 }
 
 
@@ -975,10 +1161,11 @@ def main() -> int:
     parser.add_argument("page", choices=PAGES)
     parser.add_argument(
         "what", nargs="*",
-        help="seeds: scenarios; studies: folders; benchmarks: files; default: all",
+        help="seeds: scenarios; roundings: studies; studies: folders; benchmarks: files; "
+        "default: all",
     )  # fmt: skip
     parser.add_argument(
-        "--runs", type=int, metavar="N", help="seeds: runs; gains: searches of each"
+        "--runs", type=int, metavar="N", help="seeds, roundings: runs; gains: searches of each"
     )
     parser.add_argument(
         "--engine", choices=(BATCH, GPU), help=f"gains: what makes the runs; default: {BATCH}"

@@ -39,7 +39,7 @@ _BINS, _LOWER, _UPPER, _ABREAST = 30, 0.1, 0.9, 2
 #: Maps: least and largest number of bins along each axis, number of runs in a cell from which
 #: there are more than the least, and the share of cells at each end that have the colour of the
 #: end, so that a few outliers do not dim the others.
-_CELLS, _MOST_CELLS, _ENOUGH, _FAR = 24, 200, 20, 0.01
+_CELLS, _MOST_CELLS, _ENOUGH, _FAR = 24, 200, 30, 0.01
 
 #: Up to so many different values have a bin each, or as many as a map has cells if each occurs at
 #: least as often as there are values, as in a grid.

@@ -135,6 +135,7 @@ def find_cards(instead: str) -> list[Card]:
         raise InputError(f"a graphics card needs CuPy: pip install 'auv-fmu[gpu]'; {instead}")
     try:
         cupy: Any = import_module("cupy")
+        # Without any, this is an error.
         return [CudaCard(number) for number in range(cupy.cuda.runtime.getDeviceCount())]
     # CuPy without a driver, or for another version of CUDA, raises errors of its own.
     except Exception as error:

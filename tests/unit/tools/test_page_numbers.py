@@ -1,14 +1,17 @@
-"""The benchmarks: their commands, new measurements, and the numbers on the page."""
+"""The benchmarks: their commands, new measurements, and numbers on the page; moved functions."""
 
 from __future__ import annotations
 
+import math
 import re
 import shlex
+from ctypes import CDLL, c_double
 
 import pytest
 
 import page_numbers
-from page_numbers import RESULTS, ROOT, benchmarks, command_of, is_written
+from orchestrator.machine.compilers import MATHEMATICS, SAME_NUMBERS, compile_text, find_compiler
+from page_numbers import RESULTS, ROOT, MovedFunctions, benchmarks, command_of, is_written
 from support.markdown import DOCS
 
 PAGE = (DOCS / "reference" / "benchmarks.md").read_text(encoding="utf-8")
@@ -56,3 +59,32 @@ def test_a_script_that_fails_changes_nothing_and_others_run(tmp_path, monkeypatc
     assert bad.with_suffix(".txt").read_text().endswith("once\n\n0\n")
     assert "2.5 us" in good.with_suffix(".txt").read_text()
     assert capsys.readouterr().err == f"bad stays as it is: {bad}: exit status 3\n"
+
+
+def test_functions_are_moved_by_one_unit_in_the_last_place_and_roots_are_not(tmp_path):
+    compiler = find_compiler()
+    if compiler is None:
+        pytest.skip("no C compiler")
+    text = """
+    double math_tanh(double x) { return tanh(x); }
+    double angle(double y, double x) { return atan2(y, x); }
+    double root(double x) { return sqrt(x); }
+    """
+    options = ("-shared", "-fPIC", *SAME_NUMBERS, *MATHEMATICS)
+    file = tmp_path / "moved"
+    file.write_bytes(compile_text(compiler, MovedFunctions(1).head + text, *options))
+    library = CDLL(str(file))
+    for name in ("math_tanh", "angle", "root"):
+        getattr(library, name).restype = c_double
+    found: dict[str, set[float]] = {"tanh": set(), "atan2": set()}
+    for i in range(1, 100):
+        x = i / 50
+        for name, value, exact in (
+            ("tanh", library.math_tanh(c_double(x)), math.tanh(x)),
+            ("atan2", library.angle(c_double(x), c_double(-0.3)), math.atan2(x, -0.3)),
+        ):
+            found[name].add((value - exact) / math.ulp(exact))
+        assert library.root(c_double(x)) == math.sqrt(x)
+    assert found == {name: {-1.0, 0.0, 1.0} for name in found}
+    assert library.math_tanh(c_double(0.0)) == 0.0
+    assert library.math_tanh(c_double(30.0)) == 1.0

@@ -12,6 +12,7 @@ from orchestrator.figures.study_figures import (
     bands,
     bins_of,
     draw_figures,
+    front,
     influence,
     is_logarithmic,
     maps,
@@ -116,6 +117,17 @@ def test_no_other_point_beats_one_of_the_front():
     assert found == expected
 
 
+def test_a_front_of_many_runs_shows_how_many_there_are():
+    n = 30_000
+    random = np.random.default_rng(6).lognormal(0.0, 1.0, (2, n))
+    runs = {name: np.zeros(n) for name in index_columns()}
+    runs |= zip(("peak_command.u", "late_error"), random, strict=True)
+    shown = entry(kind="front", x="peak_command.u", y="late_error", by=[])
+    [axes] = front(shown, "", Values(runs)).axes
+    [cells] = axes.collections
+    assert cells.get_array().sum() == n
+
+
 def test_influence_is_a_rank_correlation():
     pytest.importorskip("scipy", reason="needs the extra `studies`")
     runs = columns()
@@ -191,9 +203,12 @@ def test_axis_is_logarithmic_where_a_linear_one_would_hide_most(values, expected
     assert is_logarithmic(np.array(values)) is expected
 
 
-@pytest.mark.parametrize("grid", [np.geomspace(0.5, 64.0, 7), np.linspace(-3.0, 5.0, 4), [2.0]])
+@pytest.mark.parametrize(
+    "grid",
+    [np.geomspace(0.5, 64.0, 7), np.linspace(-3.0, 5.0, 4), [2.0], np.linspace(0.0, 9.0, 100)],
+)
 def test_each_value_of_a_grid_has_a_bin(grid):
-    bins = bins_of(np.repeat(grid, 3), 24)
+    bins = bins_of(np.repeat(grid, 100), 24)
     np.testing.assert_allclose(bins.centres, grid, rtol=1e-12)
     assert bins.places(np.array(grid)).tolist() == list(range(len(grid)))
     assert all(np.diff(bins.edges) > 0.0)

@@ -70,7 +70,7 @@ def test_content_of_a_file(tmp_path):
     assert study.varied == (*study.vary, *ranges)
 
 
-def test_points_are_those_of_the_sample_or_of_each_range():
+def test_points_go_to_the_sample_or_to_each_range():
     study = study_of("mine", tomllib.loads(TEXT))
     assert study.with_points(16) == study_of("mine", tomllib.loads(TEXT.replace("n = 5", "n = 16")))
     grid = TEXT.partition("[sample]")[0]
