@@ -30,11 +30,12 @@ _INCLUDE = re.compile(r"^#include .*\n", re.MULTILINE)
 _MADE = re.compile(r"\(([A-Z]\w*)\)\{")
 _ADDRESSED = re.compile(rf"&(?={_MADE.pattern})")
 
-#: The structure of all values of a run, and a declaration in it.
+#: The structure of all values of a run, a declaration in it, and a name with its length.
 _SIMULATION = re.compile(
     r"typedef struct \{\n(?P<members>(?:(?!typedef struct).)*?)\n\} simulation;", re.DOTALL
 )
 _DECLARATION = re.compile(r"^ +(\w+) ([^;]+);", re.MULTILINE)
+_NAME = re.compile(r"(\w+)(\[\w+\])?")
 
 #: A structure that begins with parameters, which steps do not change.
 _WITH_PARAMETERS = re.compile(
@@ -158,10 +159,6 @@ class _Member(NamedTuple):
     name: str
     length: str
 
-    @property
-    def is_part(self) -> bool:
-        return self.type not in _NUMBERS
-
 
 def in_cuda(source: Source, same: Mapping[int, float] = {}) -> CardText:
     """Return a program as CUDA.
@@ -182,23 +179,23 @@ def in_cuda(source: Source, same: Mapping[int, float] = {}) -> CardText:
 
 def _source(source: Source, text: str, same: Mapping[int, float], is_hot: bool) -> str:
     """Return the source of some kernels."""
+    if is_hot:
+        text = text.replace("offsetof(simulation,", "offsetof(whole,")
     structure = _SIMULATION.search(text)
     assert structure is not None
     members = [
-        _Member(type_, name.partition("[")[0], name.partition("[")[1] + name.partition("[")[2])
+        _Member(type_, name, length)
         for type_, names in _DECLARATION.findall(re.sub(r"/\*.*?\*/", "", structure["members"]))
-        for name in names.split(", ")
+        for name, length in _NAME.findall(names)
     ]
-    whole = "\n".join(f"    alignas(8) {type_} {name}{n};" for type_, name, n in members)
-    types = f"typedef struct {{\n{whole}\n}} {'whole' if is_hot else 'simulation'};"
-    run = "simulation name = {}"
+    whole = "\n".join(f"    alignas(8) {m.type} {m.name}{m.length};" for m in members)
+    types, run = f"typedef struct {{\n{whole}\n}} whole;", "simulation name = {}"
     if is_hot:
         # Each part is a variable of its own, so that one with arrays that are indexed by a variable
         # does not keep all others out of the registers.
-        text = text.replace("offsetof(simulation,", "offsetof(whole,")
-        parts = [each for each in members if each.is_part]
+        parts = [each for each in members if each.type not in _NUMBERS]
         refers = "\n".join(
-            f"    {each.type} {'&' * each.is_part}{each.name}{each.length};" for each in members
+            f"    {each.type} {'&' * (each in parts)}{each.name}{each.length};" for each in members
         )
         types += f"\n\ntypedef struct {{\n{refers}\n}} simulation;"
         run = "; ".join(
@@ -208,9 +205,7 @@ def _source(source: Source, text: str, same: Mapping[int, float], is_hot: bool) 
             ]
         )
     else:
-        types += "\n\ntypedef simulation whole;"
-    # Offsets of the structure before it was replaced.
-    start, end = _SIMULATION.search(text).span()  # type: ignore[union-attr]
+        types += "\n\ntypedef whole simulation;"
     defines = {
         "HOT": int(is_hot),
         "STEPPED": int(source.is_stepped),
@@ -222,7 +217,7 @@ def _source(source: Source, text: str, same: Mapping[int, float], is_hot: bool) 
         [
             "\n".join(f"#define {name} {value}" for name, value in defines.items()),
             _HEAD.read_text(encoding="utf-8"),
-            text[:start] + types + text[end:],
+            text[: structure.start()] + types + text[structure.end() :],
             _memory(source, members, same if is_hot else {}),
             _KERNELS.read_text(encoding="utf-8"),
         ]
