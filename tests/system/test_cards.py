@@ -8,7 +8,6 @@ from functools import cache
 from random import Random
 
 import numpy as np
-import pyarrow.parquet as pq
 import pytest
 
 from orchestrator import sweep
@@ -131,6 +130,7 @@ def test_runs_of_a_new_controller_equal_the_processor(tmp_path, monkeypatch):
 
 def test_studies_equal_the_processor(tmp_path, monkeypatch):
     """A study on two small cards: its blocks do not fit, and runs fail."""
+    pq = pytest.importorskip("pyarrow.parquet", reason="needs the extra `studies`")
     monkeypatch.setattr(card, "find_cards", lambda _: [ProcessorCard(SMALL), ProcessorCard(SMALL)])
     study = {
         "scenario": "fig5",
@@ -157,6 +157,7 @@ def test_studies_equal_the_processor(tmp_path, monkeypatch):
 
 
 def test_functions_need_rows(tmp_path, monkeypatch):
+    pytest.importorskip("pyarrow", reason="needs the extra `studies`")
     monkeypatch.setattr(card, "find_cards", lambda _: [ProcessorCard()])
     with pytest.raises(InputError, match=r"need rows, .* use --engine batch"):
         sweep(
