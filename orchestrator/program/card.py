@@ -150,7 +150,7 @@ def find_cards(instead: str) -> list[Card]:
 class Cards:
     """The graphics cards of this machine, or of a worker that it is sent to."""
 
-    least_runs, most_runs = 2**15, 2**19
+    least_runs, most_runs = 2**15, 2**17
 
     def __init__(self, instead: str, cards: Sequence[Card] = ()) -> None:
         """Take some cards; by default, all of the machine, found when they are needed.
