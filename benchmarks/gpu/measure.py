@@ -8,6 +8,8 @@ The parts, in this order, each of which prints as it goes:
   moves an index by more than 1e-9 on the processor, too: rounding errors grow there.
 - `random`: normal numbers on the card, beside Python's `random`.
 - `speed`: steps a second by `gpu`, with all indices, and by `batch` on all cores.
+- `registers`: steps a second of Fig. 4 with fewer registers for a thread, and so more threads at a
+  time.
 - `stepping`: steps a second of `Simulations`, one step a call.
 - `study`: a large study of Fig. 4 with its table, and where its time goes.
 - `policy`: steps of environments with a policy on the card, by torch where it is installed.
@@ -84,6 +86,9 @@ DRAWN_STEPS = 300
 
 #: Width of the hidden layers of the policy, and an action's share of the limits.
 HIDDEN, SHARE = 64, 0.1
+
+#: Most registers of a thread; there are 255.
+REGISTERS = (255, 192, 168, 128)
 
 #: Results by part, each of which has rows.
 Results = dict[str, list[dict[str, Any]]]
@@ -402,6 +407,23 @@ def measure_speed(report: Report, given: argparse.Namespace) -> None:
                         break
 
 
+def measure_registers(report: Report, given: argparse.Namespace) -> None:
+    """Measure steps a second with several numbers of registers for a thread."""
+    options, steps = card.OPTIONS, round(TIMED_TIME / STEP)
+    for n in REGISTERS:
+        card.OPTIONS = (*options, f"--maxrregcount={n}")
+        engine = engine_of(["fig4"], cards())
+        made(engine, some_points("fig4", STEP, 0.0, np.arange(8)))
+        blocks = (
+            some_points("fig4", TIMED_TIME, 0.0, block)
+            for block in Numbers((0, max(given.runs))).blocks(engine.most_runs)
+        )
+        runs, seconds = in_seconds(engine, blocks, given.seconds / len(REGISTERS))
+        row = {"registers": n, "runs": runs, "seconds": seconds}
+        report.add("registers", {**row, "steps a second": runs * steps / seconds})
+    card.OPTIONS = options
+
+
 def measure_stepping(report: Report, given: argparse.Namespace) -> None:
     """Measure single steps of many simulations."""
     for device in ("cuda", "cpu"):
@@ -567,6 +589,7 @@ PARTS: dict[str, Callable[[Report, argparse.Namespace], None]] = {
     "checks": measure_checks,
     "random": measure_random,
     "speed": measure_speed,
+    "registers": measure_registers,
     "stepping": measure_stepping,
     "study": measure_study,
     "policy": measure_policy,

@@ -18,7 +18,7 @@ from orchestrator.program.library import Source
 from orchestrator.program.writer import DRAWING
 
 #: Options of NVRTC: no contracted operations, and functions for the card without a mark.
-OPTIONS = (
+OPTIONS: tuple[str, ...] = (
     "--std=c++20", "--fmad=false", "--device-as-default-execution-space", "--disable-warnings",
 )  # fmt: skip
 
