@@ -22,6 +22,7 @@ from tempfile import TemporaryDirectory
 
 import nbformat
 from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.exceptions import PluginError
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from nbclient import NotebookClient
@@ -46,6 +47,10 @@ PAGES = {
 }
 
 LIVE = "live.html"
+
+#: How lunr names a node of its graph of words, and how it has to: a letter that is a digit would be
+#: part of the number before it.
+_MISTAKEN, _MENDED = "e=e+s+o.id}", 'e=e+s+o.id+","}'
 
 #: Weights of pages in the search, by the beginning of their place; the first that fits.
 BOOSTS = {
@@ -226,3 +231,17 @@ def _outside_code(change: Callable[[str], str], text: str) -> str:
     """Change the text outside fenced code."""
     parts = re.split(r"(^```.*?^```$)", text, flags=re.DOTALL | re.MULTILINE)
     return "".join(part if part.startswith("```") else change(part) for part in parts)
+
+
+def on_post_build(config: MkDocsConfig) -> None:
+    """Mend the search, which mistakes words with digits for others.
+
+    Raises:
+        PluginError: its worker is another one.
+
+    """
+    [worker] = Path(config.site_dir, "assets/javascripts/workers").glob("search.*.js")
+    before, mistaken, after = worker.read_text(encoding="utf-8").partition(_MISTAKEN)
+    if not mistaken:
+        raise PluginError(f"{worker.name}: the search has changed; see whether it is right now")
+    worker.write_text(f"{before}{_MENDED}{after}", encoding="utf-8")
