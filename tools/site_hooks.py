@@ -48,8 +48,8 @@ PAGES = {
 
 LIVE = "live.html"
 
-#: How lunr names a node of its graph of words, and how it has to: a letter that is a digit would be
-#: part of the number before it.
+#: The name of a node in the graph of words of lunr, and one without mistakes: a letter that is a
+#: digit would be part of the number before it.
 _MISTAKEN, _MENDED = "e=e+s+o.id}", 'e=e+s+o.id+","}'
 
 #: Weights of pages in the search, by the beginning of their place; the first that fits.
