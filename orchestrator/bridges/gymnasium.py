@@ -26,7 +26,7 @@ from gymnasium.vector.utils import batch_space
 from orchestrator.cosim import PortName, System, read_component
 from orchestrator.machine.errors import InputError
 from orchestrator.program.card import Card
-from orchestrator.program.many import PROCESSOR, as_array
+from orchestrator.program.many import NAMES_OF_PROCESSOR, as_array
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.preparation import DEFAULT_STEP, load
 from orchestrator.runs.request import method_takes_keywords, option
@@ -278,7 +278,7 @@ class TrackingVector(VectorEnv[np.ndarray, np.ndarray, np.ndarray]):  # type: ig
             for space in (self._task.observations, self._task.actions)
         )
         #: One for each environment, but on a card one for all.
-        self._draws_together = options.device not in PROCESSOR
+        self._draws_together = options.device not in NAMES_OF_PROCESSOR
         n_generators = 1 if self._draws_together else self.num_envs
         self._generators = [np.random.default_rng() for _ in range(n_generators)]
 

@@ -221,6 +221,13 @@ def find_card(name: str, instead: str) -> Card:
     return cards[number]
 
 
+def words_of_a_run(card: Card, kernels: Callable[[str], Launch]) -> int:
+    """Return how many words of 64 bits a run takes, besides its generators'."""
+    found = card.arrays.empty(1, np.int32)
+    kernels("words_of_a_run")(1, found)
+    return int(card.to_numpy(found)[0])
+
+
 class CardProgram:
     """A program that cards run, many runs at a time on each; several threads may make runs.
 
@@ -274,9 +281,8 @@ class _OnCard:
         self._same: Mapping[int, float] | None = None
         with card:
             self._rest = card.kernels(in_cuda(source).rest)
-            sizes = card.arrays.empty(2, np.int32)
-            self._rest("sizes")(1, sizes)
-            self._words, self._generators = sizes.tolist()
+            self._words = words_of_a_run(card, self._rest)
+        self._generators = len(source.noises)
 
     def runs(
         self, values: np.ndarray, grids: Grids, same: Mapping[int, float]

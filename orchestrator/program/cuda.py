@@ -97,7 +97,7 @@ struct word_places {
 )
 
 _MEMORY = """\
-enum {{ WORDS = sizeof(whole) / sizeof(uint64_t), GENERATORS = {generators} }};
+enum {{ WORDS = sizeof(whole) / sizeof(uint64_t) }};
 
 /* Numbers of 8 bytes, and perhaps one of 4 at the end. */
 template <int SIZE>
@@ -239,7 +239,6 @@ def _memory(source: Source, members: list[_Member], same: Mapping[int, float]) -
             calls["steps"].append(f"    copy_out<{size}>(&it->{each.name}, {place}")
     apart = "{0}.words = {{words + {1} * GENERATOR_WORDS * n + 2 * i, n}};"
     return _MEMORY.format(
-        generators=len(source.noises),
         fetch="\n".join(calls["copy_in"]),
         store="\n".join(calls["copy_out"]),
         store_steps="\n".join(calls["steps"]),

@@ -33,12 +33,9 @@ extern "C" __global__ void advance(int n, uint64_t memory[], uint32_t words[], c
 
 #else
 
-/* Gives the numbers of words, of generators and of numbers of a run. */
-extern "C" __global__ void sizes(int n, int found[]) {
-    EACH(i, n) {
-        found[0] = WORDS;
-        found[1] = GENERATORS;
-    }
+/* Gives the number of words of a run. */
+extern "C" __global__ void words_of_a_run(int n, int found[]) {
+    EACH(i, n) { found[0] = WORDS; }
 }
 
 #if STEPPED

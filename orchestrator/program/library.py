@@ -145,7 +145,7 @@ class Program:
         """
         self.source = source
         self.library = _loaded(source)
-        self.size = self.library.size_of_simulation()
+        self.size: int = self.library.size_of_simulation()
         self._memory = _ThreadMemory()
 
     def run(

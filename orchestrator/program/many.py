@@ -14,7 +14,7 @@ import numpy as np
 from orchestrator.cosim import PortName
 from orchestrator.machine.errors import InputError
 from orchestrator.machine.workers import cores
-from orchestrator.program.card import GENERATOR, Card, find_card
+from orchestrator.program.card import GENERATOR, Card, find_card, words_of_a_run
 from orchestrator.program.cuda import in_cuda
 from orchestrator.program.session import Place, Places, SteppedProgram
 
@@ -22,7 +22,7 @@ from orchestrator.program.session import Place, Places, SteppedProgram
 _WORTH_A_THREAD = 128
 
 #: Names of the processor as a device.
-PROCESSOR = (None, "cpu")
+NAMES_OF_PROCESSOR = (None, "cpu")
 
 #: Bytes of a word.
 _WORD = 8
@@ -218,10 +218,8 @@ class ManyOnCard(Many):
             arrays = card.arrays
             text = in_cuda(program.source)
             self._rest = card.kernels(text.rest)
-            found = arrays.zeros(2, np.int32)
-            self._rest("sizes")(1, found)
-            words, generators = card.to_numpy(found).tolist()
-            rows = words + GENERATOR * generators // 2
+            words = words_of_a_run(card, self._rest)
+            rows = words + GENERATOR * len(program.source.noises) // 2
             most = card.free_memory() // (_WORD * rows)
             if n > most:
                 raise InputError(f"n = {n}: {card.name} has memory for {most}")
@@ -292,7 +290,7 @@ def many_of(
         InputError: there is no such device, it has too little memory, or no compiler.
 
     """
-    if device in PROCESSOR:
+    if device in NAMES_OF_PROCESSOR:
         return ManyOnProcessor(program, n, threads)
     if isinstance(device, str):
         device = find_card(device, "without device, the processor does the same")

@@ -103,6 +103,14 @@ class SteppedProgram:
         self._starts = np.array([float(text.start(name, bare)) for name in self.settables])
 
     @cached_property
+    def _program(self) -> Program:
+        program = Program(self.source)
+        for name, arguments in _ARGUMENTS.items():
+            getattr(program.library, name).argtypes = arguments
+        program.library.reason.restype = c_char_p
+        return program
+
+    @property
     def library(self) -> CDLL:
         """The compiled functions.
 
@@ -110,17 +118,12 @@ class SteppedProgram:
             InputError: there is no compiler.
 
         """
-        library = Program(self.source).library
-        for name, arguments in _ARGUMENTS.items():
-            getattr(library, name).argtypes = arguments
-        library.reason.restype = c_char_p
-        return library
+        return self._program.library
 
     @property
     def size(self) -> int:
         """Bytes of a simulation."""
-        size: int = self.library.size_of_simulation()
-        return size
+        return self._program.size
 
     @cached_property
     def places(self) -> Places:

@@ -84,6 +84,6 @@ def _compiled(text: str) -> ctypes.CDLL:
     compiler = Compiler([command, "-x", "c++"])
     key = sha256(text.encode()).hexdigest()[:24]
     return load_library(
-        "cards", key, "advance" if "HOT 1" in text else "sizes",
+        "cards", key, "advance" if "HOT 1" in text else "words_of_a_run",
         lambda: compile_text(compiler, text, *FLAGS, *MATHEMATICS),
     )  # fmt: skip
