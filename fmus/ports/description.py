@@ -206,7 +206,7 @@ _CAPABILITIES_2 = {
 }
 
 
-def fmi2_description(model: Model, guid: str) -> bytes:
+def fmi2_description(model: Model, guid: str, has_derivatives: bool = False) -> bytes:
     """Write the description of a model whose library contains the GUID."""
     root = _root("2.0", model, guid=guid)
     implementation = SubElement(root, "CoSimulation", modelIdentifier=model.identifier)
@@ -216,6 +216,8 @@ def fmi2_description(model: Model, guid: str) -> bytes:
     SubElement(root, "ModelStructure")
     complete(root, (*model.ports, FAULT))
     implementation.attrib.update(_capabilities(model, implementation.attrib))
+    if has_derivatives:
+        implementation.attrib["providesDirectionalDerivative"] = "true"
     return document(root)
 
 
@@ -275,7 +277,9 @@ _CAPABILITIES_3 = {**_CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializ
 _PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin")
 
 
-def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
+def fmi3_description(
+    model: Model, token: str, arrays: bool = False, has_derivatives: bool = False
+) -> bytes:
     """Write the description of a model whose library contains the token.
 
     With `arrays`, vectors and matrices of one unit are array variables.
@@ -284,6 +288,9 @@ def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
     variables = variables_of(ports, arrays)
     root = _root("3.0", model, instantiationToken=token)
     capabilities = _capabilities(model, _CAPABILITIES_3)
+    if has_derivatives:
+        names = ("providesDirectionalDerivatives", "providesAdjointDerivatives")
+        capabilities |= dict.fromkeys(names, "true")
     SubElement(root, "CoSimulation", capabilities, modelIdentifier=model.identifier)
     root.extend(
         (

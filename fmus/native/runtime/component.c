@@ -10,10 +10,12 @@
  * store.c      getting and setting values of ports
  * run.c        modes and steps
  * state.c      the state as bytes, and the checks before it is restored
+ * derivative.c derivatives of outputs
  *
  * docs/reference/fmi-answers.md lists the answers to all calls.
  */
 #include "equations.c"
+#include "derivatives.c"
 #include "identity.h"
 
 typedef enum { REAL, INTEGER, BOOLEAN, ENUMERATION } fmi_type;
@@ -23,6 +25,7 @@ typedef struct {
     string types[ENUMERATION + 1]; /* types of values */
     int enumerations_are_integers; /* true if functions for Integers pass them */
     string token;                  /* name of the GUID or token */
+    int has_time;                  /* true if the time is a variable */
 } names;
 
 static const names version;
@@ -117,6 +120,15 @@ typedef struct {
     int fault;
 } run;
 
+/* Derivatives: seeds, and what follows from them. */
+typedef struct {
+    parameter_values parameters;
+    input_values inputs;
+    state_values state;
+    double time;
+    output_values outputs;
+} directions;
+
 struct instance {
     listener host;
     int in_error;
@@ -132,6 +144,7 @@ struct instance {
     /* Values that a call sets, until all are checked. */
     parameter_values set_parameters;
     input_values set_inputs;
+    directions along; /* for derivatives */
 };
 
 #include "ports.h"
@@ -143,6 +156,7 @@ struct instance {
 #include "store.c"
 #include "run.c"
 #include "state.c"
+#include "derivative.c"
 
 /* Functions of FMI have arguments that components do not use. */
 #if defined(__GNUC__)
