@@ -200,9 +200,11 @@ def test_answers_in_all_modes(native: Path, tmp_path: Path):
         assert it.jacobian([known]).any()
         for unknown, of in ((outputs[0], outputs[0]), (known, known)):
             with pytest.raises(FMICallException, match="status 3"):
-                it.fmu.getDirectionalDerivative([unknown.valueReference], [of.valueReference], [1.0])
+                it.fmu.getDirectionalDerivative(
+                    [unknown.valueReference], [of.valueReference], [1.0]
+                )
         give = it.fmu.dll.fmi2GetDirectionalDerivative
-        n, some = c_size_t(1), (c_uint * 1)(known.valueReference)
+        n, some = c_size_t(1), (c_uint * 1)(this)
         it.fmu.terminate()
         assert it.jacobian([known]).any()
         # NULL leads to the state error, as everywhere.

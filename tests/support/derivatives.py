@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -107,7 +108,7 @@ class Differentiated:
                 continue  # a value that is refused
             finally:
                 self.set(variable, held)
-            finer = [(4.0 * b - a) / 3.0 for a, b in zip(halves, halves[1:], strict=False)]
+            finer = [(4.0 * b - a) / 3.0 for a, b in pairwise(halves)]
             found[0, :, i], found[1, :, i] = finer[1], np.abs(finer[1] - finer[0])
         return found[0], found[1]
 
