@@ -198,11 +198,10 @@ def test_answers_in_all_modes(native: Path, tmp_path: Path):
         np.testing.assert_array_equal(it.get(outputs), before)
         it.fmu.exitInitializationMode()
         assert it.jacobian([known]).any()
-        for unknown, of in ((outputs[0], outputs[0]), (known, known)):
+        output, this = outputs[0].valueReference, known.valueReference
+        for references in (([output], [output]), ([this], [this])):
             with pytest.raises(FMICallException, match="status 3"):
-                it.fmu.getDirectionalDerivative(
-                    [unknown.valueReference], [of.valueReference], [1.0]
-                )
+                it.fmu.getDirectionalDerivative(*references, [1.0])
         give = it.fmu.dll.fmi2GetDirectionalDerivative
         n, some = c_size_t(1), (c_uint * 1)(this)
         it.fmu.terminate()
