@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 
 from fmus.language import tree
+from fmus.language.build import Program
 from fmus.language.tree import Function
 from fmus.language.types import Scalar, Type, count, type_of
 from fmus.native.dual import DualEmitter
@@ -13,10 +14,8 @@ from fmus.native.emit import Emitter, lines_of
 from fmus.native.names import in_c
 from fmus.native.pieces import function, initializer, moves
 from fmus.native.translator import MOST_ON_STACK, deepest, translation
+from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
-
-#: The hooks that outputs follow from.
-_HOOKS = ("start", "restarted", "derive", "outputs", "measured")
 
 _ARGUMENTS = {
     "starts": "int starts",
@@ -60,7 +59,7 @@ def derivatives(definition: Definition) -> str | None:
     """
     _, program, emitter, passages = translation(definition)
     behaviour = definition.behaviour
-    hooks = {name: program.function(hook) for name in _HOOKS if (hook := behaviour.hooks[name])}
+    hooks = _hooks(behaviour, program)
     functions = [*_needed(program.functions.values(), hooks.values())]
     if 2 * deepest(functions)[0] > MOST_ON_STACK:
         return None
@@ -93,7 +92,7 @@ def derivatives(definition: Definition) -> str | None:
     ]
     if "t" in taken:
         lines.append("const Dual now = {t, dt};")
-    if "state" in taken:
+    if "start" in hooks:
         lines += [
             f"{dual.type(groups['state'])} x;",
             "if (starts) {",
@@ -102,11 +101,11 @@ def derivatives(definition: Definition) -> str | None:
             f"    x = {joined['state']};",
             "}",
         ]
-    if behaviour.hooks["credible"]:
+    if "restarted" in hooks:
         lines.append(
             f"if (!model_credible(parameters, state, inputs, error)) x = {calls['restarted']};"
         )
-    if "derived" in taken:
+    if "derive" in hooks:
         lines.append(f"const {dual.type(hooks['derive'].returns)} seen = {calls['derive']};")
     lines.append(f"{dual.type(hooks['outputs'].returns)} y = {calls['outputs']};")
     if behaviour.noisy:
@@ -118,6 +117,22 @@ def derivatives(definition: Definition) -> str | None:
         function(_DIFFERENTIATE, lines, [*_ARGUMENTS]),
     ]
     return "\n\n".join([_HEAD.format(1), dual.text(), *parts]) + "\n"
+
+
+def _hooks(behaviour: Behaviour, program: Program) -> dict[str, Function]:
+    """Return the hooks that outputs follow from."""
+    hooks: dict[str, Function] = {}
+    for name, given in {
+        "measured": "",
+        "outputs": "",
+        "derive": "derived",
+        "restarted": "state",
+        "start": "state",
+    }.items():
+        is_needed = not given or any(given in hook.arguments for hook in hooks.values())
+        if is_needed and (hook := behaviour.hooks[name]):
+            hooks[name] = program.function(hook)
+    return hooks
 
 
 def _needed(functions: Iterable[Function], hooks: Iterable[Function]) -> Iterator[Function]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from ctypes import c_double, c_size_t, c_uint, c_void_p
 from pathlib import Path
 
+import fmpy
 import mpmath
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ from fmus.kinds import NATIVE, PYTHON
 from fmus.language.mathematics import FUNCTIONS
 from orchestrator.machine.compilers import machines_compiler
 from orchestrator.runs.own_components import build_own
+from support.all_types import build
 from support.derivatives import check, instance
 
 pytestmark = pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
@@ -79,6 +81,12 @@ def jacobian_of(path: Path, folder: Path) -> np.ndarray:
 @pytest.mark.parametrize("name", components())
 def test_derivatives_are_those_of_differences(request, tmp_path: Path, name: str, bundle: str):
     check(request.getfixturevalue(bundle) / f"{name}.fmu", tmp_path)
+
+
+def test_derivatives_of_ports_and_states_of_all_types(tmp_path: Path):
+    for fmi in ("2", "3"):
+        fmu = build.native(tmp_path / f"native{fmi}", fmi).with_suffix(".fmu")
+        check(fmu, tmp_path / fmi, share=0.4)
 
 
 def test_functions_of_math_have_the_slopes_of_mpmath(made, tmp_path: Path):
@@ -208,6 +216,34 @@ def test_answers_in_all_modes(native: Path, tmp_path: Path):
         assert it.jacobian([known]).any()
         # NULL leads to the state error, as everywhere.
         assert give(c_void_p(it.fmu.component), None, n, some, n, (c_double * 1)(1.0), None) == 3
+
+
+def test_equations_with_large_arrays_have_none(tmp_path: Path):
+    """Dual numbers take twice the place, and a thread's stack is small."""
+    text = """\
+from typing import Annotated, NamedTuple
+from auv_fmu import Variable, Vector
+
+
+class Inputs(NamedTuple):
+    x: Annotated[float, Variable("1", "x")]
+
+
+class Outputs(NamedTuple):
+    y: Annotated[float, Variable("1", "y")]
+
+
+def outputs(inputs: Inputs) -> Outputs:
+    many = Vector(inputs.x for _ in range({n}))
+    return Outputs(many.sum())
+"""
+    for n, has in ((5_000, True), (12_000, False)):
+        folder = tmp_path / str(n)
+        folder.mkdir()
+        (folder / "own.py").write_text(text.format(n=n))
+        path = build_own(folder / "own.py", folder / "fmu", kind=NATIVE)
+        stated = fmpy.read_model_description(str(path)).coSimulation.providesDirectionalDerivative
+        assert stated is has
 
 
 def test_other_fmus_say_that_they_have_none(made, tmp_path: Path):
