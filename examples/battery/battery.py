@@ -49,8 +49,15 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Charge, and voltages of the pairs."""
 
-    charge: float  #: as a fraction of the capacity
-    v: Annotated[Vector, 2]  #: voltages of the pairs [V]
+    charge: Annotated[float, Variable("1", "Charge as a fraction of the capacity")]
+    v: Annotated[Vector, 2, Variable("V", "Voltage of a pair")]
+
+
+class Margins(NamedTuple):
+    """Distances from the charges at which the current stops."""
+
+    empty: Annotated[float, Variable("1", "From empty to the charge")]
+    full: Annotated[float, Variable("1", "From the charge to full")]
 
 
 class Outputs(NamedTuple):
@@ -81,6 +88,22 @@ def update(parameters: Parameters, state: State, derived: float, h: float) -> St
         for v, R, C in zip(state.v, parameters.R, parameters.C)
     )
     return State(charge, v)
+
+
+def rates(parameters: Parameters, state: State, derived: float) -> State:
+    """Rates of the state."""
+    v = Vector(derived / C - v / (R * C) for v, R, C in zip(state.v, parameters.R, parameters.C))
+    return State(-derived / (3600 * parameters.capacity), v)
+
+
+def switches(state: State) -> Margins:
+    """Distances from empty and full."""
+    return Margins(state.charge, 1.0 - state.charge)
+
+
+def event(state: State) -> State:
+    """The state at an event: the charge has stopped at empty or full."""
+    return State(min(max(state.charge, 0.0), 1.0), state.v)
 
 
 def outputs(parameters: Parameters, state: State, derived: float) -> Outputs:
