@@ -50,7 +50,7 @@ class State(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """What moves continuously."""
+    """Motion between bounces."""
 
     h: Annotated[float, Variable("m", "Height of the ball")]
     v: Annotated[float, Variable("m/s", "Velocity of the ball, upwards")]

@@ -174,7 +174,8 @@ def _counts(values: Mapping[str, Sequence[Port]]) -> Iterator[str]:
 def _continuous(places: Sequence[int]) -> str:
     """Write the places of the continuous states in the state; C has no empty arrays."""
     numbers = ", ".join(map(str, places or [0]))
-    return f"\n/* Places of the continuous states. */\nstatic const size_t continuous[] = {{{numbers}}};\n"
+    declared = f"static const size_t continuous[] = {{{numbers}}};"
+    return f"\n/* Places of the continuous states. */\n{declared}\n"
 
 
 def _state(scalars: Iterable[Any]) -> Iterator[str]:

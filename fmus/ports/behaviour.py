@@ -124,7 +124,8 @@ _RETURNS: Mapping[str, Any] = {
 
 #: The argument that has the same type as the result of a hook.
 _SAME = {
-    "start": "state", "update": "state", "restarted": "state", "event": "state", "derive": "derived",
+    "start": "state", "update": "state", "restarted": "state", "event": "state",
+    "derive": "derived",
 }  # fmt: skip
 
 
@@ -252,7 +253,7 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
 
 
 def _check_exchange(where: str, hints: Mapping[str, Mapping[str, Any]], state: Any) -> None:
-    """Refuse hooks of model exchange without rates, and rates of what is no continuous state."""
+    """Refuse hooks of model exchange without rates, and rates that are not of the state."""
     for name in EXCHANGE:
         if name in hints and "rates" not in hints:
             raise Misdeclared(f"{where} has {name}, but no rates", name)

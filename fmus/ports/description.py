@@ -279,7 +279,7 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
 
 
 def _variable(place: int, port: Port, places: Mapping[str, int]) -> Element:
-    """Return a variable whose value reference is its index, which is its place but for one."""
+    """Return a variable whose value reference is its index, one less than its place."""
     variable = Element("ScalarVariable", _variable_attributes(place - 1, port))
     values = value_attributes(port)
     if port.derivative:

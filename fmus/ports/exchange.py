@@ -15,10 +15,7 @@ from fmus.ports.units import rate_of
 
 
 def exchanged(behaviour: Behaviour) -> tuple[Port, ...]:
-    """Return the variables of model exchange of a component, which has none without rates.
-
-    The description of a state is in the class that `rates` returns; it may be missing.
-    """
+    """Return the variables of model exchange of a component; without rates, none."""
     if behaviour.rates is None:
         return ()
     states = [*_local(behaviour.rates, "state.")]

@@ -95,9 +95,8 @@ def test_both_kinds_say_the_same(python: ModelDescription, fmi2: Path):
     first, second = everything(python), everything(read_model_description(str(fmi2)))
     assert len(first["modelVariables"]) == len(ports_of(python.modelName)) + 1
     local = [v for v in second["modelVariables"] if v["causality"] == "local"]
-    for variable, twin in zip(
-        [*first["modelVariables"], *local], second["modelVariables"], strict=True
-    ):
+    twins = [*first["modelVariables"], *local]
+    for variable, twin in zip(twins, second["modelVariables"], strict=True):
         assert variable == twin
     assert second.keys() == first.keys()
     differ = {key for key in second if second[key] != first[key]}
@@ -148,8 +147,9 @@ def test_both_versions_have_the_same_variables(fmi2: Path, fmi3: Path):
 def edges(description: ModelDescription, part: str) -> dict[str, set[str] | None]:
     """The dependencies of each unknown, except the time; None: on everything."""
     return {
-        unknown.variable.name: unknown.dependencies
-        and {v.name for v in unknown.dependencies} - {"time"}
+        unknown.variable.name: None
+        if unknown.dependencies is None
+        else {v.name for v in unknown.dependencies} - {"time"}
         for unknown in getattr(description, part)
     }
 

@@ -1,8 +1,8 @@
 /* Model exchange: the host integrates the rates of the continuous states.
  *
  * Its variables are the continuous states, their rates and the event indicators, in this order
- * after all ports. A component without rates has none of them, and an instance for co-simulation
- * refuses the functions.
+ * after all ports. A component without rates does not have them. An instance for co-simulation
+ * refuses the functions of model exchange.
  */
 #include <string.h>
 
@@ -21,7 +21,7 @@ static void *for_exchange(void *handle) {
     return handle;
 }
 
-/* True if a call, which is allowed in some modes of model exchange, can go on. */
+/* True if the instance of a call is for model exchange, and not in error. */
 static int is_for_exchange(call *this, int allowed) {
     if (this->instance == NULL) return 0;
     if (!this->instance->exchanges) {
@@ -56,8 +56,8 @@ static string wrong_indicators(const double values[], size_t n) {
     return wrong_count(values, n, MODEL_SWITCHES);
 }
 
-/* Discards a call whose values the equations do not take. The host may try others, so this is no
- * fault. */
+/* Discards a call whose values the equations do not take. A solver tries such values, so `fault`
+ * stays as it is. */
 static void discard(call *this, message *why) {
     this->status = FMI_DISCARD;
     log_once(this->instance, why, FMI_DISCARD, NULL);
@@ -145,7 +145,7 @@ static void set_continuous_states(call *this, const double x[]) {
     note_state(it);
 }
 
-/* What the equations give at the present state. */
+/* Equations that are evaluated at the present state. */
 typedef void (*law)(const model_parameters *, const model_state *, const model_derived *,
                     const model_inputs *, double, double[], Error *);
 

@@ -14,8 +14,7 @@ static int adopt(instance *it, const parameter_values *values, message *why);
  * changed. */
 static int refresh(instance *it, message *why);
 
-/* Returns a variable of model exchange, if the reference is one's: a continuous state, a rate or an
- * event indicator. */
+/* Variables of model exchange: continuous states, their rates and event indicators. */
 static int is_exchanged(uint32_t reference);
 static double exchanged(call *this, uint32_t reference);
 
