@@ -54,10 +54,9 @@ class State(NamedTuple):
 
 
 class Margins(NamedTuple):
-    """Distances from the charges at which the current stops."""
+    """Distance at which the current stops."""
 
-    empty: Annotated[float, Variable("1", "From empty to the charge")]
-    full: Annotated[float, Variable("1", "From the charge to full")]
+    charge: Annotated[float, Variable("1", "From the charge to empty or full")]
 
 
 class Outputs(NamedTuple):
@@ -92,18 +91,13 @@ def update(parameters: Parameters, state: State, derived: float, h: float) -> St
 
 def rates(parameters: Parameters, state: State, derived: float) -> State:
     """Rates of the state."""
-    v = Vector(derived / C - v / (R * C) for v, R, C in zip(state.v, parameters.R, parameters.C))
+    v = Vector((R * derived - v) / (R * C) for v, R, C in zip(state.v, parameters.R, parameters.C))
     return State(-derived / (3600 * parameters.capacity), v)
 
 
 def switches(state: State) -> Margins:
-    """Distances from empty and full."""
-    return Margins(state.charge, 1.0 - state.charge)
-
-
-def event(state: State) -> State:
-    """The state at an event: the charge has stopped at empty or full."""
-    return State(min(max(state.charge, 0.0), 1.0), state.v)
+    """Distance from empty or full."""
+    return Margins(min(state.charge, 1.0 - state.charge))
 
 
 def outputs(parameters: Parameters, state: State, derived: float) -> Outputs:

@@ -50,13 +50,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Heights and velocities."""
 
-    x: Annotated[
-        Vector,
-        4,
-        Variable(
-            {"body": "m", "v_body": "m/s", "wheel": "m", "v_wheel": "m/s"}, "Heights and velocities"
-        ),
-    ]
+    x: Annotated[Vector, 4, Variable({"z1": "m", "v1": "m/s", "z2": "m", "v2": "m/s"}, "Motion")]
 
 
 class Outputs(NamedTuple):
