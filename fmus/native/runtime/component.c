@@ -1,7 +1,7 @@
 /* The component: the code between the equations and ports of a model and the functions of FMI.
  *
  * fmi2.c and fmi3.c include this file, each in one translation unit, and define NAMED,
- * FIRST_REFERENCE, `version` and call_logger. A function of FMI is then
+ * FIRST_REFERENCE, HAS_TIME, `version` and call_logger. A function of FMI is then
  *
  *     FUNCTION(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
  *
@@ -9,6 +9,7 @@
  * noise.c      Python's random numbers
  * store.c      getting and setting values of ports
  * run.c        modes and steps
+ * exchange.c   model exchange, for components with rates
  * state.c      the state as bytes, and the checks before it is restored
  * derivative.c derivatives of outputs
  *
@@ -25,7 +26,6 @@ typedef struct {
     string types[ENUMERATION + 1]; /* types of values */
     int enumerations_are_integers; /* true if functions for Integers pass them */
     string token;                  /* name of the GUID or token */
-    int has_time;                  /* true if the time is a variable */
 } names;
 
 static const names version;
@@ -120,18 +120,20 @@ typedef struct {
     int fault;
 } run;
 
-/* Derivatives: seeds, and what follows from them. */
+/* Derivatives: seeds, and what follows from them. In initialisation the state follows, too. */
 typedef struct {
     parameter_values parameters;
     input_values inputs;
     state_values state;
     double time;
     output_values outputs;
+    double rates[AT_LEAST_ONE(MODEL_RATES)];
 } directions;
 
 struct instance {
     listener host;
     int in_error;
+    int exchanges; /* true for model exchange */
     run run;
     parameter_values meant; /* parameters in use */
     double longest_step;
@@ -141,6 +143,8 @@ struct instance {
     size_t n_logged;
     uint64_t logged[MOST_MESSAGES];
     state_values restarted; /* for the outputs of a state that is not credible */
+    double rates[AT_LEAST_ONE(MODEL_RATES)];
+    double switches[AT_LEAST_ONE(MODEL_SWITCHES)];
     /* Values that a call sets, until all are checked. */
     parameter_values set_parameters;
     input_values set_inputs;
@@ -155,6 +159,7 @@ struct instance {
 #include "guard.c"
 #include "store.c"
 #include "run.c"
+#include "exchange.c"
 #include "state.c"
 #include "derivative.c"
 
