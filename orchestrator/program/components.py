@@ -151,7 +151,10 @@ def _load(script: Path) -> ModuleType:
     """
     folder, name = script.resolve().parent, script.stem
     _forget_others(folder)
-    if name in sys.modules and name not in _loaded:
+    known = sys.modules.get(name)
+    if known is not None and name not in _loaded:
+        if getattr(known, "__file__", None) == str(script.resolve()):
+            return known
         raise InputError(f"{name} is already a module of Python; choose another name")
     importlib.invalidate_caches()
     writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True
