@@ -34,8 +34,7 @@ _MOST_ROUNDS = 20
 _SAME = 1e-12
 
 
-#: What :func:`model` and the others take: the name of a component or a scenario, a path, or a
-#: system.
+#: A component or a system: a name, a path, the entries of a scenario file, or a loaded system.
 Source = str | Path | Mapping[str, Any] | System
 
 #: Names of parameters, or of groups of them, that are symbols; None: all Reals.
@@ -282,7 +281,7 @@ class _System:
         if self._stages.passing is None:
             raise InputError(
                 f"observe: outputs in the order {self._plan.experiment.order} belong to different "
-                "times; take those of advance"
+                "times; take the outputs of advance"
             )
         moment, values = self._moment(iter(state), iter(inputs)), self._parameters(parameters)
         self._refresh(moment, values, t)
