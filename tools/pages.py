@@ -545,7 +545,7 @@ def _first_line(name: str) -> str:
 
 
 def differentiated() -> str:
-    """Table of what the FMUs of components and examples can be differentiated by."""
+    """Table of the Reals of each component and example."""
     sources = {f"[{name}](components/{name}.md)": source_of(name) for name in components()}
     for path in sorted(EXAMPLES.glob("*/*.py")):
         if path.stem == path.parent.name:

@@ -1,5 +1,5 @@
-/* Directional and adjoint derivatives at one time: of what a host would get by what it could set, and
- * by the time.
+/* Directional and adjoint derivatives of outputs, states and rates at one time, by inputs, parameters,
+ * states and the time.
  *
  * In initialisation they go through the initial state; later the state is held.
  */
@@ -11,8 +11,7 @@ static int is_time(uint32_t reference) {
     return HAS_TIME && reference == FIRST_REFERENCE + N_PORTS;
 }
 
-/* Returns the place of a continuous state, or after all of them that of a rate; -1 if the variable is
- * neither. */
+/* Returns the place of a continuous state, or of a rate after all states; -1 for another variable. */
 static int exchanged_place(uint32_t reference) {
     int place = (int)(reference - FIRST_EXCHANGED);
     return is_exchanged(reference) && place < 2 * MODEL_RATES ? place : -1;
