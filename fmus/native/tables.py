@@ -13,6 +13,7 @@ from fmus.language.types import Record, Type, type_of
 from fmus.native.emit import members, quoted
 from fmus.ports.definition import Definition
 from fmus.ports.description import variables_of
+from fmus.ports.exchange import places_of_states
 from fmus.ports.groups import is_class, reals_first, scalars_of
 from fmus.ports.port import FAULT, H_MAX, Port
 
@@ -42,7 +43,8 @@ def tables(definition: Definition, arrays: bool = False) -> str:
     """Write the file ports.h of a component."""
     behaviour = definition.behaviour
     places = places_of(definition, "model") | {H_MAX: "PARAMETER_AT(h_max)"}
-    return port_tables(definition.ports, places, scalars_of(behaviour.state), arrays)
+    continuous = places_of_states(behaviour)
+    return port_tables(definition.ports, places, scalars_of(behaviour.state), arrays, continuous)
 
 
 def places_of(definition: Definition, owner: str) -> dict[str, str]:
@@ -53,9 +55,22 @@ def places_of(definition: Definition, owner: str) -> dict[str, str]:
 
 
 def port_tables(
-    ports: Sequence[Port], parameters: Mapping[str, str], state: Iterable[Any], arrays: bool = False
+    ports: Sequence[Port],
+    parameters: Mapping[str, str],
+    state: Iterable[Any],
+    arrays: bool = False,
+    continuous: Sequence[int] = (),
 ) -> str:
-    """Write the file ports.h for all ports but `fault`; `state` are the types of its numbers."""
+    """Write the file ports.h.
+
+    Args:
+        ports: all ports but `fault`.
+        parameters: places of the parameters.
+        state: types of the state's numbers.
+        arrays: True if vectors and matrices of one unit are array variables.
+        continuous: places of the continuous states among the numbers.
+
+    """
     values = {
         causality: reals_first([port for port in ports if port.causality == causality])
         for causality in ("input", "output")
@@ -76,6 +91,7 @@ def port_tables(
             *(_references(causality, some, ports) for causality, some in values.items()),
             *_counts(values),
             *_state(state),
+            _continuous(continuous),
         )
     )
 
@@ -153,6 +169,13 @@ def _counts(values: Mapping[str, Sequence[Port]]) -> Iterator[str]:
         f"enum {{ REAL_INPUTS = {len(reals['input'])}, REAL_OUTPUTS = {len(reals['output'])}, "
         f"INPUTS_HAVE_RANGES = {int(ranged)} }};\n"
     )
+
+
+def _continuous(places: Sequence[int]) -> str:
+    """Write the places of the continuous states in the state; C has no empty arrays."""
+    numbers = ", ".join(map(str, places or [0]))
+    declared = f"static const size_t continuous[] = {{{numbers}}};"
+    return f"\n/* Places of the continuous states. */\n{declared}\n"
 
 
 def _state(scalars: Iterable[Any]) -> Iterator[str]:

@@ -32,7 +32,7 @@ from fmus.native.names import in_c
 from fmus.native.pieces import function, has_only_doubles, initializer, moves
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
-from fmus.ports.groups import Nothing
+from fmus.ports.groups import Nothing, count_values
 
 _HEAD = """\
 /* {title}
@@ -72,8 +72,11 @@ _TAKES = {
 }
 
 #: All constants for the runtime: also the number of random numbers, whether outputs are sampled,
-#: whether a state may be replaced, and whether an update checks its own result.
-_ASKED = ("DRAWS", "SAMPLED", "HAS_GUARD", "CHECKS_STATES", *_TAKES)
+#: whether a state may be replaced, whether an update checks its own result, and for model exchange
+#: the numbers of rates and of event indicators, and whether events change the state.
+_ASKED = (
+    "DRAWS", "SAMPLED", "HAS_GUARD", "CHECKS_STATES", "RATES", "SWITCHES", "HAS_EVENT", *_TAKES,
+)  # fmt: skip
 
 #: Functions for the runtime: result, arguments, and the body if a component has no such hook.
 _CALLED = {
@@ -87,6 +90,9 @@ _CALLED = {
     "evaluate": ("void", f"{_P}, {_S}, {_D}, {_I}, double t, {_O}, {_E}", ()),
     "update": ("void", f"{_P}, {_NEXT}, {_SCRATCH}, {_I}, double t, double h, {_E}", ()),
     "measure": ("void", f"{_P}, const double draws[], {_O}, {_E}", ()),
+    "rates": ("void", f"{_P}, {_S}, {_D}, {_I}, double t, double rates[], {_E}", ()),
+    "switches": ("void", f"{_P}, {_S}, {_D}, {_I}, double t, double switches[], {_E}", ()),
+    "event": ("void", f"{_P}, {_NEXT}, {_D}, {_I}, double t, {_E}", ()),
 }  # fmt: skip
 
 
@@ -162,7 +168,13 @@ def _glue(emitter: Emitter, program: Program, behaviour: Behaviour) -> str:
         "derive": [f"*derived = {calls['derive']};"] if behaviour.derived else [],
         "evaluate": put("outputs", "outputs"),
         "update": put("state", "update"),
+        "event": put("state", "event"),
     }
+    for what, made in (("rates", behaviour.rates), ("switches", behaviour.switches)):
+        if made is not None:
+            type_ = type_of(made)
+            moved = moves(type_, "it", range(count(type_)), f"{what}[{{place}}] = {{member}};")
+            bodies[what] = [f"{emitter.type(type_)} it = {calls[what]};", *moved]
     if "seed" in calls:
         # The cast adds 2^32 to a negative seed.
         bodies["seed"] = [f"return (unsigned int){calls['seed']};"]
@@ -191,6 +203,9 @@ def _constants(behaviour: Behaviour) -> str:
         "DRAWS": behaviour.draws,
         "SAMPLED": behaviour.is_sampled,
         "HAS_GUARD": behaviour.hooks["credible"] is not None,
+        "RATES": 0 if behaviour.rates is None else count_values(behaviour.rates),
+        "SWITCHES": 0 if behaviour.switches is None else count_values(behaviour.switches),
+        "HAS_EVENT": behaviour.hooks["event"] is not None,
         **{name: behaviour.takes(*question) for name, question in _TAKES.items()},
     }
     return constants(numbers, _directives(behaviour.restarted))

@@ -42,7 +42,13 @@ HOOKS: Mapping[str, tuple[str, ...]] = {
     "seed": ("parameters",),
     "measured": ("parameters", "n"),
     "check_state": ("parameters", "state"),
+    "rates": ("parameters", "state", "derived", "inputs", "t"),
+    "switches": ("parameters", "state", "derived", "inputs", "t"),
+    "event": ("parameters", "state", "derived", "inputs", "t"),
 }
+
+#: The hooks of model exchange, which no step calls.
+EXCHANGE = ("rates", "switches", "event")
 
 #: Formats of numbers in texts that C supports, too.
 NUMBER_FORMAT = re.compile(r"[+ ]?(?:[1-9][0-9]{0,2})?(?:\.[0-9]{1,3})?[efgEG]")
@@ -63,6 +69,7 @@ class Behaviour(NamedTuple):
         derived: type that `derive` returns; None without this hook.
         noisy: name of the group of outputs that `measured` returns; empty without this hook.
         draws: number of random numbers that `measured` takes.
+        rates, switches: types that these hooks return, with floats only; None without them.
         restarted: the text `RESTARTED`, for `str.format`.
         is_sampled: True if the outputs belong to the last communication point.
         h_max: default of the largest internal step [s]; None if no step is split.
@@ -78,6 +85,8 @@ class Behaviour(NamedTuple):
     derived: Any
     noisy: str
     draws: int
+    rates: Any
+    switches: Any
     restarted: str
     is_sampled: bool
     h_max: float | None
@@ -114,7 +123,10 @@ _RETURNS: Mapping[str, Any] = {
 }  # fmt: skip
 
 #: The argument that has the same type as the result of a hook.
-_SAME = {"start": "state", "update": "state", "restarted": "state", "derive": "derived"}
+_SAME = {
+    "start": "state", "update": "state", "restarted": "state", "event": "state",
+    "derive": "derived",
+}  # fmt: skip
 
 
 def read_behaviour(module: ModuleType) -> Behaviour:
@@ -134,11 +146,12 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         )
     noisy = _noisy(where, hints, outputs)
     types = _types_of_groups(hints)
+    _check_exchange(where, hints, types.get("state", Nothing))
     if "state" in types and "start" not in hooks:
         name = next(name for name, own in hints.items() if "state" in own)
         raise Misdeclared(f"{where}.{name} takes a state, but there is no start", name)
     for name, own in hints.items():
-        if name not in ("outputs", "measured"):
+        if name not in ("outputs", "measured", "rates", "switches"):
             wanted = _RETURNS[name] if name in _RETURNS else types[_SAME[name]]
             check_same(where, name, "return", own["return"], wanted)
         for argument, hint in own.items():
@@ -162,6 +175,8 @@ def read_behaviour(module: ModuleType) -> Behaviour:
         types.get("derived"),
         "".join(noisy),
         count_values(hints["measured"]["n"]) if "measured" in hooks else 0,
+        hints["rates"]["return"] if "rates" in hooks else None,
+        hints["switches"]["return"] if "switches" in hooks else None,
         _message(where, names.get("RESTARTED", "")),
         names.get("SAMPLED", False),
         seconds_in(names, "H_MAX", None),
@@ -180,6 +195,8 @@ def _check_constants(where: str, behaviour: Behaviour) -> None:
         raise Misdeclared(f"{where}.outputs takes no inputs, so it is not SAMPLED", "outputs")
     if behaviour.h_max is not None and behaviour.hooks["update"] is None:
         raise Misdeclared(f"{where} has H_MAX, but no update", "outputs")
+    if behaviour.rates is not None and behaviour.is_sampled:
+        raise Misdeclared(f"{where} is SAMPLED, and rates are of continuous components", "rates")
 
 
 def seconds_in(names: Mapping[str, Any], name: str, default: Any) -> Any:
@@ -233,6 +250,26 @@ def _noisy(where: str, hints: Mapping[str, Mapping[str, Any]], outputs: type) ->
         why = f"takes {drawn} as n; write a float, or a tuple or Vector of them"
         raise Misdeclared(f"{where}.measured {why}", "measured", "n")
     return noisy
+
+
+def _check_exchange(where: str, hints: Mapping[str, Mapping[str, Any]], state: Any) -> None:
+    """Refuse hooks of model exchange without rates, and rates that are not of the state."""
+    for name in EXCHANGE:
+        if name in hints and "rates" not in hints:
+            raise Misdeclared(f"{where} has {name}, but no rates", name)
+    if "rates" in hints and "credible" in hints:
+        raise Misdeclared(f"{where} has rates, and credible, which only steps call", "rates")
+    for name in ("rates", "switches"):
+        made = hints.get(name, {}).get("return", Nothing)
+        if not (is_record(made) and {*scalars_of(made)} <= {float}):
+            why = f"returns {word(form(made))}; write a NamedTuple of floats"
+            raise Misdeclared(f"{where}.{name} {why}", name)
+    fields = fields_of(state)
+    for name, hint in fields_of(hints["rates"]["return"]).items() if "rates" in hints else ():
+        if name not in fields or form(hint) != form(fields[name]):
+            known = ", ".join(f"{name}: {word(form(hint))}" for name, hint in fields.items())
+            why = f"returns the rate of {name}: {word(form(hint))}; the state has {known}"
+            raise Misdeclared(f"{where}.rates {why}", "rates")
 
 
 def _types_of_groups(hints: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from fmus.ports.behaviour import Behaviour, read_behaviour
+from fmus.ports.exchange import exchanged
 from fmus.ports.fields import declared
 from fmus.ports.groups import ParameterSet
 from fmus.ports.port import FAULT, H_MAX, TIME, Misdeclared, Port, is_line, largest_step
@@ -55,6 +56,11 @@ class Model:
     experiment: DefaultExperiment
 
     @property
+    def local(self) -> tuple[Port, ...]:
+        """Continuous states, their rates and event indicators, for model exchange."""
+        return ()
+
+    @property
     def identifier(self) -> str:
         """The name of its library, which is valid in C."""
         name = re.sub(r"\W", "_", self.name, flags=re.ASCII)
@@ -87,6 +93,11 @@ class Definition(Model):
     parameters: ParameterSet[Any]
     noisy: tuple[str, ...]
     behaviour: Behaviour
+
+    @property
+    def local(self) -> tuple[Port, ...]:
+        """Continuous states, their rates and event indicators, for model exchange."""
+        return exchanged(self.behaviour)
 
 
 @cache
@@ -126,6 +137,8 @@ def define(name: str, module: ModuleType) -> Definition:
             raise Misdeclared(f"{place} is {text!r:.40}; write it without control characters")
     noisy = tuple(port.name for port in outputs[behaviour.noisy]) if behaviour.noisy else ()
     experiment = DefaultExperiment(behaviour.stop, behaviour.step)
+    for name_taken in {port.name for port in exchanged(behaviour)} & {port.name for port in ports}:
+        raise Misdeclared(f"{name_taken} is the name of a port, and of model exchange", "rates")
     return Definition(name, summary, origin, ports, experiment, own, noisy, behaviour)
 
 

@@ -34,14 +34,14 @@ SOURCES: Mapping[str, str] = {"2": "fmi2.c", "3": "fmi3.c"}
 _LOGGED = ("Warning", "Discard", "Error", "Fatal")
 
 #: Attribute `initial` by causality; the standard forbids it for other causalities.
-_INITIAL = {"output": "calculated", "parameter": "exact"}
+_INITIAL = {"output": "calculated", "parameter": "exact", "local": "calculated"}
 
 
 class Dependency(NamedTuple):
     """Dependencies of an output, by indices in FMI 2.0 and by value references in FMI 3.0."""
 
     number: int  #: number of the output
-    direct: list[int]  #: variables that it depends on without a state in between
+    direct: list[int]  #: variables that it depends on at once, and continuous states
     initial: list[int] | None  #: variables that its initial value depends on; None: on all
 
 
@@ -77,6 +77,26 @@ def document(root: Element) -> bytes:
     indent(root)
     content: bytes = tostring(root, encoding="utf-8")
     return b'<?xml version="1.0" encoding="UTF-8"?>\n' + content + b"\n"
+
+
+class Local(NamedTuple):
+    """Numbers of the variables of model exchange."""
+
+    states: list[int]
+    rates: list[int]
+    switches: list[int]
+
+
+def local_in(ports: Sequence[Port], numbers: Iterable[int] | None = None) -> Local:
+    """Return the numbers of local variables; ports are numbered as for `dependencies`."""
+    numbered = [*zip(ports, numbers or count(1))]
+    states = {port.derivative for port in ports}
+    found = Local([], [], [])
+    for port, number in numbered:
+        if port.causality == "local":
+            kind = found.states if port.name in states else found.switches
+            (found.rates if port.derivative else kind).append(number)
+    return found
 
 
 def _variable_attributes(reference: int, port: Port) -> dict[str, str]:
@@ -152,6 +172,7 @@ def dependencies(
     """
     places = {port.name: place for port, place in zip(ports, numbers or count(1))}
     parameters = [places[port.name] for port in ports if port.causality == "parameter"]
+    states = local_in(ports, places.values()).states
     for port in ports:
         if port.causality == "output":
             # FMI 2.0 has no variable for the time.
@@ -163,7 +184,8 @@ def dependencies(
             elif port.initially is not None:
                 start = [places[name] for name in port.initially]
                 initial = [*direct, *start, *parameters]
-            yield Dependency(places[port.name], direct, initial)
+            known = direct if port == FAULT else [*direct, *states]
+            yield Dependency(places[port.name], known, initial)
 
 
 def _dependent_on(known: Sequence[int] | None) -> dict[str, str]:
@@ -209,14 +231,27 @@ _CAPABILITIES_2 = {
 def fmi2_description(model: Model, guid: str) -> bytes:
     """Write the description of a model whose library contains the GUID."""
     root = _root("2.0", model, guid=guid)
-    implementation = SubElement(root, "CoSimulation", modelIdentifier=model.identifier)
-    SubElement(SubElement(implementation, "SourceFiles"), "File", name=SOURCES["2"])
+    for interface in ("ModelExchange", "CoSimulation") if model.local else ("CoSimulation",):
+        element = SubElement(root, interface, modelIdentifier=model.identifier)
+        SubElement(SubElement(element, "SourceFiles"), "File", name=SOURCES["2"])
     root.extend((_log_categories("fmi2"), _default_experiment(model.experiment)))
     SubElement(root, "ModelVariables")
     SubElement(root, "ModelStructure")
-    complete(root, (*model.ports, FAULT))
+    complete(root, (*model.ports, FAULT, *model.local))
+    implementation = _element(root, "CoSimulation")
     implementation.attrib.update(_capabilities(model, implementation.attrib))
+    if model.local:
+        root.attrib["numberOfEventIndicators"] = str(len(local_in(model.local).switches))
+        of_exchange = {name: value for name, value in _CAPABILITIES_2.items() if name != _ANY_STEP}
+        _element(root, "ModelExchange").attrib.update(of_exchange)
     return document(root)
+
+
+def _element(root: Element, name: str) -> Element:
+    """Return an element that is there."""
+    element = root.find(name)
+    assert element is not None
+    return element
 
 
 def complete(root: Element, ports: Sequence[Port]) -> Element:
@@ -228,24 +263,28 @@ def complete(root: Element, ports: Sequence[Port]) -> Element:
         ports: all ports, in the order of their value references.
 
     """
-    implementation = root.find("CoSimulation")
-    variables = root.find("ModelVariables")
-    structure = root.find("ModelStructure")
-    assert implementation is not None and variables is not None and structure is not None
+    implementation = _element(root, "CoSimulation")
     implementation.attrib.update(_CAPABILITIES_2)
-    variables[:] = [_variable(reference, port) for reference, port in enumerate(ports)]
-    structure[:] = _structure(ports)
+    places = {port.name: place for place, port in enumerate(ports, start=1)}
+    variables = [_variable(places[port.name], port, places) for port in ports]
+    _element(root, "ModelVariables")[:] = variables
+    _element(root, "ModelStructure")[:] = _structure(ports)
     types = _type_definitions(ports, _add_type)
+    at = [*root].index(implementation) + 1
     if units := _units(ports):
-        root.insert(1, unit_definitions(units))
+        root.insert(at, unit_definitions(units))
     if len(types):
-        root.insert(1 + bool(units), types)
+        root.insert(at + bool(units), types)
     return root
 
 
-def _variable(reference: int, port: Port) -> Element:
-    variable = Element("ScalarVariable", _variable_attributes(reference, port))
-    SubElement(variable, port.type, value_attributes(port))
+def _variable(place: int, port: Port, places: Mapping[str, int]) -> Element:
+    """Return a variable whose value reference is its index, one less than its place."""
+    variable = Element("ScalarVariable", _variable_attributes(place - 1, port))
+    values = value_attributes(port)
+    if port.derivative:
+        values["derivative"] = str(places[port.derivative])
+    SubElement(variable, port.type, values)
     return variable
 
 
@@ -253,13 +292,21 @@ def _add_type(parent: Element, kind: str, name: str, **attributes: str) -> Eleme
     return SubElement(SubElement(parent, "SimpleType", name=name), kind, attributes)
 
 
-def _structure(ports: Sequence[Port]) -> tuple[Element, Element]:
-    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
+def _structure(ports: Sequence[Port]) -> list[Element]:
+    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too.
+
+    Rates, and at the start continuous states, may depend on everything.
+    """
     outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
+    derivatives, local = Element("Derivatives"), local_in(ports)
     for output in dependencies(ports):
         for parent, known in ((outputs, output.direct), (initial_unknowns, output.initial)):
             SubElement(parent, "Unknown", _dependent_on(known), index=str(output.number))
-    return outputs, initial_unknowns
+    for number in local.rates:
+        SubElement(derivatives, "Unknown", index=str(number))
+    for number in (*local.states, *local.rates):
+        SubElement(initial_unknowns, "Unknown", index=str(number))
+    return [outputs, *([derivatives] if local.rates else []), initial_unknowns]
 
 
 # FMI 3.0
@@ -280,10 +327,13 @@ def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
 
     With `arrays`, vectors and matrices of one unit are array variables.
     """
-    ports = (*model.ports, FAULT, TIME)
+    ports = (*model.ports, FAULT, TIME, *model.local)
     variables = variables_of(ports, arrays)
     root = _root("3.0", model, instantiationToken=token)
     capabilities = _capabilities(model, _CAPABILITIES_3)
+    if model.local:
+        of_exchange = {name: value for name, value in capabilities.items() if name != _ANY_STEP}
+        SubElement(root, "ModelExchange", of_exchange, modelIdentifier=model.identifier)
     SubElement(root, "CoSimulation", capabilities, modelIdentifier=model.identifier)
     root.extend(
         (
@@ -356,12 +406,15 @@ def _names(names: Mapping[str, str], scalars: Iterable[str]) -> dict[str, None]:
 
 def _variables(variables: Sequence[_Variable]) -> Element:
     root = Element("ModelVariables")
+    references = {port.name: reference for reference, port, _ in variables}
     for reference, port, elements in variables:
         attributes = {**_variable_attributes(reference, port), **value_attributes(port)}
         if port.start is not None:
             attributes["start"] = " ".join(
                 value_attributes(element)["start"] for element in elements
             )
+        if port.derivative:
+            attributes["derivative"] = str(references[port.derivative])
         variable = SubElement(root, TYPES[port.type], attributes)
         for size in port.array.shape if port.array else ():
             SubElement(variable, "Dimension", start=str(size))
@@ -370,15 +423,24 @@ def _variables(variables: Sequence[_Variable]) -> Element:
 
 def _structure_3(variables: Sequence[_Variable]) -> Element:
     """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
-    outputs = [
-        *dependencies(
-            [variable.port for variable in variables],
-            [variable.reference for variable in variables],
-        )
-    ]
+    ports = [variable.port for variable in variables]
+    numbers = [variable.reference for variable in variables]
+    outputs = [*dependencies(ports, numbers)]
+    local = local_in(ports, numbers)
     structure = Element("ModelStructure")
-    for name, on in (("Output", "direct"), ("InitialUnknown", "initial")):
-        for output in outputs:
-            known = _dependent_on(getattr(output, on))
-            SubElement(structure, name, known, valueReference=str(output.number))
+
+    def add(name: str, number: int, known: list[int] | None = None) -> None:
+        attributes = _dependent_on(known)
+        SubElement(structure, name, attributes, valueReference=str(number))
+
+    for output in outputs:
+        add("Output", output.number, output.direct)
+    for number in local.rates:
+        add("ContinuousStateDerivative", number)
+    for output in outputs:
+        add("InitialUnknown", output.number, output.initial)
+    for number in (*local.states, *local.rates):
+        add("InitialUnknown", number)
+    for number in local.switches:
+        add("EventIndicator", number)
     return structure

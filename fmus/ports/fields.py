@@ -51,7 +51,7 @@ def declared(
 
     Args:
         made: the class, a NamedTuple.
-        causality: of the ports: `input`, `output` or `parameter`.
+        causality: of the ports: `input`, `output`, `parameter` or `local`.
         direct, initial: defaults of `feedthrough` and `initially` of outputs.
         prefix: prefix of the names of the ports.
         given: start values, if they differ from the defaults of the class.
@@ -107,6 +107,8 @@ def _prefix(notes: tuple[Any, ...], field: str, place: tuple[str, ...]) -> str:
 def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner: Any) -> Variable:
     """Return the Variable of a field, with its members; refuse an invalid one."""
     variables = [note for note in notes if isinstance(note, Variable)]
+    if not variables and causality == "local":
+        variables = [Variable("", place[-1])]
     if len(variables) != 1:
         example = f'{place[-1]}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
         raise _wrong(place, f"has no unit and no description; write {example}")
@@ -250,7 +252,7 @@ def _port(causality: str, variable: Variable, part: _Part, place: tuple[str, ...
         raise _wrong(place, str(error).removeprefix(f"{part.name} ")) from None
     except Refusal as refusal:
         raise _wrong(place, f"starts with {refusal}") from None
-    return replace(port, start=None) if causality == "output" else port
+    return replace(port, start=None) if causality in ("output", "local") else port
 
 
 def _fmi_type(part: _Part, place: tuple[str, ...]) -> tuple[str, Any, dict[str, int]]:

@@ -52,11 +52,12 @@ class Port:
 
     Attributes:
         name: structured name, for example `tau.u`.
-        causality: `input`, `output`, `parameter`, or `independent`, which is the time.
+        causality: `input`, `output`, `parameter`, `local` of a variable of model exchange, or
+            `independent`, which is the time.
         variability: `continuous`, `discrete`, `fixed` or `tunable`.
         type: of FMI: `Real`, `Integer`, `Boolean` or `Enumeration`.
         unit: unit of a Real, in the form that :mod:`fmus.ports.units` reads.
-        start: value before anything is set; None for outputs.
+        start: value before anything is set; None for outputs and local variables.
         description: one line.
         minimum, maximum: inclusive bounds of a number.
         choices: values of an Enumeration by their names.
@@ -65,6 +66,7 @@ class Port:
         initially: further inputs on which the initial value of an output depends; None if it
             depends on everything that is set.
         array: the array that it is an element of, if any; all its elements have one unit.
+        derivative: name of the continuous state that this is the rate of, if it is one.
 
     """
 
@@ -82,6 +84,7 @@ class Port:
     feedthrough: tuple[str, ...] = ()
     initially: tuple[str, ...] | None = ()
     array: Array | None = None
+    derivative: str = ""
 
     def __post_init__(self) -> None:
         """Refuse what the description of an FMU cannot express."""
@@ -89,7 +92,7 @@ class Port:
             raise Misdeclared(f"{self.name} {why}")
 
     def _flaws(self) -> Iterator[str]:
-        if not _NAME.fullmatch(self.name):
+        if not _NAME.fullmatch(self.derivative or self.name):
             yield "is not a name of FMI; use the letters a to z, digits and _"
         if not is_line(self.description):
             yield f"has the description {self.description!r:.40}; write one line of text"

@@ -136,6 +136,15 @@ def unit_of(text: str) -> Unit:
     return Unit(name, {base: n for base, n in exponents.items() if n}, factor)
 
 
+def rate_of(text: str) -> str:
+    """Return the unit of a rate of a quantity with a unit; empty if it has no short form."""
+    product, slash, divisor = text.partition("/")
+    power = re.fullmatch(r"s(\d*)", divisor)
+    if not text or unit_of(text).offset or (slash and not power):
+        return ""
+    return f"{product}/s{int(power[1] or 1) + 1}" if power else f"{text}/s"
+
+
 def _symbol(symbol: str) -> tuple[float, dict[str, int]] | None:
     """Return the factor and the base units of a symbol; None for an unknown symbol."""
     if symbol in _OTHERS:

@@ -30,6 +30,7 @@ from fmus.native.emit import Emitter, closed, members, number_in_c
 from fmus.native.names import RUNTIME, in_c
 from fmus.native.pieces import Place, function, scalars, structure
 from fmus.native.reducer import ReducerText
+from fmus.ports.behaviour import EXCHANGE
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Port
 from fmus.ports.reducer import Reducer
@@ -358,7 +359,11 @@ class Equations:
         by_id = {id(reducer): reducer for reducer in reducers}
         euler: Any = EULER
         hooks = {
-            definition: {name: hook for name, hook in definition.behaviour.hooks.items() if hook}
+            definition: {
+                name: hook
+                for name, hook in definition.behaviour.hooks.items()
+                if hook and name not in EXCHANGE
+            }
             for definition in counts
         }
         index_hooks = [hook for reducer in by_id.values() for hook in reducer.hooks.values()]

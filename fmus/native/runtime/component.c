@@ -1,7 +1,7 @@
 /* The component: the code between the equations and ports of a model and the functions of FMI.
  *
  * fmi2.c and fmi3.c include this file, each in one translation unit, and define NAMED,
- * FIRST_REFERENCE, `version` and call_logger. A function of FMI is then
+ * FIRST_REFERENCE, HAS_TIME, `version` and call_logger. A function of FMI is then
  *
  *     FUNCTION(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
  *
@@ -9,6 +9,7 @@
  * noise.c      Python's random numbers
  * store.c      getting and setting values of ports
  * run.c        modes and steps
+ * exchange.c   model exchange, for components with rates
  * state.c      the state as bytes, and the checks before it is restored
  *
  * docs/reference/fmi-answers.md lists the answers to all calls.
@@ -120,6 +121,7 @@ typedef struct {
 struct instance {
     listener host;
     int in_error;
+    int exchanges; /* true for model exchange */
     run run;
     parameter_values meant; /* parameters in use */
     double longest_step;
@@ -129,6 +131,8 @@ struct instance {
     size_t n_logged;
     uint64_t logged[MOST_MESSAGES];
     state_values restarted; /* for the outputs of a state that is not credible */
+    double rates[AT_LEAST_ONE(MODEL_RATES)];
+    double switches[AT_LEAST_ONE(MODEL_SWITCHES)];
     /* Values that a call sets, until all are checked. */
     parameter_values set_parameters;
     input_values set_inputs;
@@ -142,6 +146,7 @@ struct instance {
 #include "guard.c"
 #include "store.c"
 #include "run.c"
+#include "exchange.c"
 #include "state.c"
 
 /* Functions of FMI have arguments that components do not use. */

@@ -4,7 +4,7 @@
 
 #include "host.h"
 
-enum { CO_SIMULATION = 1 };
+enum { MODEL_EXCHANGE, CO_SIMULATION };
 
 /* A kind of fmi2GetRealStatus. */
 enum { LAST_SUCCESSFUL_TIME = 2 };
@@ -19,6 +19,13 @@ typedef struct {
     void (*step_finished)(void *, int);
     void *environment;
 } callbacks;
+
+/* fmi2EventInfo. */
+typedef struct {
+    int new_discrete_states_needed, terminate_simulation, nominals_changed, values_changed;
+    int next_event_time_defined;
+    double next_event_time;
+} event_info;
 
 static logger logger_of(const callbacks *functions) {
     if (functions == NULL) return (logger){NULL, NULL};

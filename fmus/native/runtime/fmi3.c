@@ -1,7 +1,7 @@
 /* The functions of FMI 3.0, and the file to compile: it includes all others.
  *
- * Functions that co-simulation without events, clocks and derivatives does not need return
- * fmi3Error.
+ * Functions that neither co-simulation nor model exchange needs without clocks and derivatives
+ * return fmi3Error.
  */
 #include "platform.h"
 
@@ -14,7 +14,7 @@
 #endif
 
 /* Value references are indices of the variables, from 1, since some hosts use them as such. */
-enum { FIRST_REFERENCE = 1 };
+enum { FIRST_REFERENCE = 1, HAS_TIME = 1 };
 
 #include "component.c"
 
@@ -83,16 +83,16 @@ static const char ANOTHER_TYPE[] = "this FMU is for co-simulation only";
 EXPORT void *NAMED(fmi3InstantiateModelExchange)(string name, string token, string resources,
                                                  boolean visible, boolean logging,
                                                  void *environment, fmi3_logger log) {
-    return make("fmi3InstantiateModelExchange", ANOTHER_TYPE, name, token, logging, environment,
-                log);
+    return for_exchange(make("fmi3InstantiateModelExchange", EXCHANGES ? NULL : ANOTHER_TYPE, name,
+                             token, logging, environment, log));
 }
 
 EXPORT void *NAMED(fmi3InstantiateScheduledExecution)(
     string name, string token, string resources, boolean visible, boolean logging,
     void *environment, fmi3_logger log, void (*update)(void *), void (*lock)(void),
     void (*unlock)(void)) {
-    return make("fmi3InstantiateScheduledExecution", ANOTHER_TYPE, name, token, logging,
-                environment, log);
+    return make("fmi3InstantiateScheduledExecution", "this FMU has no scheduled execution", name,
+                token, logging, environment, log);
 }
 
 EXPORT void NAMED(fmi3FreeInstance)(void *c) { free_instance(c, "fmi3FreeInstance"); }
@@ -213,19 +213,45 @@ FUNCTION(fmi3DeserializeFMUState, MASK_FMUstate, NULL,
          (void *c, const uint8_t bytes[], size_t size, void **state),
          deserialise_state(&this, bytes, size, state))
 
+/* Model exchange */
+
+EXCHANGED(fmi3EnterEventMode, MASK_EnterEventMode, NULL, (void *c), enter_mode(&this, IN_EVENT))
+EXCHANGED(fmi3EnterContinuousTimeMode, MASK_EnterContinuousTimeMode, NULL, (void *c),
+          enter_mode(&this, INTEGRATING))
+EXCHANGED(fmi3EvaluateDiscreteStates, MASK_EvaluateDiscreteStates, NULL, (void *c), )
+EXCHANGED(fmi3UpdateDiscreteStates, MASK_UpdateDiscreteStates,
+          needed &&terminate &&nominals &&values &&defined &&next ? NULL : "NULL",
+          (void *c, boolean *needed, boolean *terminate, boolean *nominals, boolean *values,
+           boolean *defined, double *next),
+          *needed = *terminate = *nominals = *defined = 0;
+          *next = 0.0; *values = (boolean)update_discrete_states(&this))
+EXCHANGED(fmi3CompletedIntegratorStep, MASK_CompletedIntegratorStep,
+          event &&terminate ? NULL : "NULL",
+          (void *c, boolean no_set, boolean *event, boolean *terminate), *event = *terminate = 0)
+EXCHANGED(fmi3SetTime, MASK_SetTime, NULL, (void *c, double time), set_time(&this, time))
+EXCHANGED(fmi3SetContinuousStates, MASK_SetContinuousStates, wrong_states(x, n),
+          (void *c, const double x[], size_t n), set_continuous_states(&this, x))
+EXCHANGED(fmi3GetContinuousStates, MASK_Get, wrong_states(x, n), (void *c, double x[], size_t n),
+          get_continuous_states(&this, x))
+EXCHANGED(fmi3GetContinuousStateDerivatives, MASK_Get, wrong_states(dx, n),
+          (void *c, double dx[], size_t n), get_rates(&this, dx))
+EXCHANGED(fmi3GetEventIndicators, MASK_Get, wrong_indicators(z, n), (void *c, double z[], size_t n),
+          get_switches(&this, z))
+EXCHANGED(fmi3GetNominalsOfContinuousStates, MASK_Get, wrong_states(x, n),
+          (void *c, double x[], size_t n), get_nominals(x))
+EXCHANGED(fmi3GetNumberOfContinuousStates, MASK_Get, wrong_place(n), (void *c, size_t *n),
+          *n = MODEL_RATES)
+EXCHANGED(fmi3GetNumberOfEventIndicators, MASK_Get, wrong_place(n), (void *c, size_t *n),
+          *n = MODEL_SWITCHES)
+
 /* Unsupported functions */
 
 #define UNSUPPORTED(name, ...)                                                                   \
     FUNCTION(name, MASK_NotSupported, NULL, (__VA_ARGS__), refuse_unsupported(&this, FMI_ERROR))
 
-UNSUPPORTED(fmi3EnterEventMode, void *c)
 UNSUPPORTED(fmi3EnterStepMode, void *c)
-UNSUPPORTED(fmi3EnterContinuousTimeMode, void *c)
 UNSUPPORTED(fmi3EnterConfigurationMode, void *c)
 UNSUPPORTED(fmi3ExitConfigurationMode, void *c)
-UNSUPPORTED(fmi3EvaluateDiscreteStates, void *c)
-UNSUPPORTED(fmi3UpdateDiscreteStates, void *c, boolean *needed, boolean *terminate,
-            boolean *nominals, boolean *values, boolean *defined, double *next)
 UNSUPPORTED(fmi3GetNumberOfVariableDependencies, void *c, uint32_t variable, size_t *n)
 UNSUPPORTED(fmi3GetVariableDependencies, void *c, uint32_t variable, size_t elements[],
             uint32_t independents[], size_t independent_elements[], int kinds[], size_t n)
@@ -251,13 +277,3 @@ UNSUPPORTED(fmi3SetShiftDecimal, void *c, const uint32_t r[], size_t n, const do
 UNSUPPORTED(fmi3SetShiftFraction, void *c, const uint32_t r[], size_t n, const uint64_t counters[],
             const uint64_t resolutions[])
 UNSUPPORTED(fmi3ActivateModelPartition, void *c, uint32_t clock, double time)
-UNSUPPORTED(fmi3CompletedIntegratorStep, void *c, boolean no_set, boolean *event,
-            boolean *terminate)
-UNSUPPORTED(fmi3SetTime, void *c, double time)
-UNSUPPORTED(fmi3SetContinuousStates, void *c, const double states[], size_t n)
-UNSUPPORTED(fmi3GetContinuousStateDerivatives, void *c, double derivatives[], size_t n)
-UNSUPPORTED(fmi3GetEventIndicators, void *c, double indicators[], size_t n)
-UNSUPPORTED(fmi3GetContinuousStates, void *c, double states[], size_t n)
-UNSUPPORTED(fmi3GetNominalsOfContinuousStates, void *c, double nominals[], size_t n)
-UNSUPPORTED(fmi3GetNumberOfEventIndicators, void *c, size_t *n)
-UNSUPPORTED(fmi3GetNumberOfContinuousStates, void *c, size_t *n)

@@ -5,6 +5,10 @@
  *
  * The C kind performs the action of both. For the Python kind the loader performs the action of
  * FUNCTION, and forwards FORWARDED with these arguments to PythonFMU.
+ *
+ *     EXCHANGED(name, allowed, wrong, parameters, action)
+ *
+ * defines a function of model exchange, and EXCHANGES is true if the FMU has model exchange.
  */
 
 EXPORT string NAMED(fmi2GetTypesPlatform)(void) { return "default"; }
@@ -13,9 +17,10 @@ EXPORT string NAMED(fmi2GetVersion)(void) { return "2.0"; }
 
 EXPORT void *NAMED(fmi2Instantiate)(string name, int type, string guid, string location,
                                     const callbacks *functions, int visible, int logging) {
-    string wrong = type == CO_SIMULATION ? NULL : "this FMU is for co-simulation only";
-    return instantiate("fmi2Instantiate", wrong, name, "GUID", guid, location, visible,
-                       logger_of(functions), logging);
+    int known = type == CO_SIMULATION || (EXCHANGES && type == MODEL_EXCHANGE);
+    void *made = instantiate("fmi2Instantiate", known ? NULL : "this FMU is for co-simulation only",
+                             name, "GUID", guid, location, visible, logger_of(functions), logging);
+    return type == MODEL_EXCHANGE ? for_exchange(made) : made;
 }
 
 EXPORT void NAMED(fmi2FreeInstance)(void *c) { free_instance(c, "fmi2FreeInstance"); }
@@ -103,17 +108,25 @@ FUNCTION(fmi2GetBooleanStatus, MASK_Get, wrong_place(v), (void *c, int kind, int
 
 /* Functions of model exchange, which some hosts look for in every FMU. */
 
-#define OF_MODEL_EXCHANGE(name, ...)                                                             \
-    FUNCTION(name, MASK_NotSupported, NULL, (__VA_ARGS__), refuse_unsupported(&this, FMI_ERROR))
-
-OF_MODEL_EXCHANGE(fmi2EnterEventMode, void *c)
-OF_MODEL_EXCHANGE(fmi2NewDiscreteStates, void *c, void *events)
-OF_MODEL_EXCHANGE(fmi2EnterContinuousTimeMode, void *c)
-OF_MODEL_EXCHANGE(fmi2CompletedIntegratorStep, void *c, int no_set, int *enter_events,
-                  int *terminate)
-OF_MODEL_EXCHANGE(fmi2SetTime, void *c, double time)
-OF_MODEL_EXCHANGE(fmi2SetContinuousStates, void *c, const double x[], size_t nx)
-OF_MODEL_EXCHANGE(fmi2GetDerivatives, void *c, double derivatives[], size_t nx)
-OF_MODEL_EXCHANGE(fmi2GetEventIndicators, void *c, double indicators[], size_t ni)
-OF_MODEL_EXCHANGE(fmi2GetContinuousStates, void *c, double x[], size_t nx)
-OF_MODEL_EXCHANGE(fmi2GetNominalsOfContinuousStates, void *c, double x_nominal[], size_t nx)
+EXCHANGED(fmi2EnterEventMode, MASK_EnterEventMode, NULL, (void *c), enter_mode(&this, IN_EVENT))
+EXCHANGED(fmi2EnterContinuousTimeMode, MASK_EnterContinuousTimeMode, NULL, (void *c),
+          enter_mode(&this, INTEGRATING))
+EXCHANGED(fmi2NewDiscreteStates, MASK_UpdateDiscreteStates, wrong_place(events),
+          (void *c, event_info *events), {
+              *events = (event_info){0};
+              events->values_changed = update_discrete_states(&this);
+          })
+EXCHANGED(fmi2CompletedIntegratorStep, MASK_CompletedIntegratorStep,
+          enter_events &&terminate ? NULL : "NULL",
+          (void *c, int no_set, int *enter_events, int *terminate), *enter_events = *terminate = 0)
+EXCHANGED(fmi2SetTime, MASK_SetTime, NULL, (void *c, double time), set_time(&this, time))
+EXCHANGED(fmi2SetContinuousStates, MASK_SetContinuousStates, wrong_states(x, n),
+          (void *c, const double x[], size_t n), set_continuous_states(&this, x))
+EXCHANGED(fmi2GetContinuousStates, MASK_Get, wrong_states(x, n), (void *c, double x[], size_t n),
+          get_continuous_states(&this, x))
+EXCHANGED(fmi2GetDerivatives, MASK_Get, wrong_states(dx, n), (void *c, double dx[], size_t n),
+          get_rates(&this, dx))
+EXCHANGED(fmi2GetEventIndicators, MASK_Get, wrong_indicators(z, n), (void *c, double z[], size_t n),
+          get_switches(&this, z))
+EXCHANGED(fmi2GetNominalsOfContinuousStates, MASK_Get, wrong_states(x, n),
+          (void *c, double x[], size_t n), get_nominals(x))

@@ -49,7 +49,11 @@ static call begin(void *handle, string function, int allowed) {
 }
 
 static int check_mode(call *this) {
-    static const string names[] = {"instantiated", "initialising", "stepping", "terminated"};
+    static const string names[] = {
+        "instantiated",  "initialising",
+        "stepping",      "in event mode",
+        "in continuous-time mode", "terminated",
+    };
     message why;
     if (this->allowed & WHEN(this->instance->run.mode)) return 1;
     compose(&why, "%s is not allowed when %s", this->function, names[this->instance->run.mode]);

@@ -31,10 +31,19 @@ enum { FMI_OK, FMI_WARNING, FMI_DISCARD, FMI_ERROR, FMI_FATAL };
  *
  * docs/reference/fmi-answers.md lists every call in every mode, and explains why more is allowed
  * here than in the standards. AFTER_ERROR, FMI's error state, occurs in each of the others. */
-typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED, AFTER_ERROR } mode;
+typedef enum {
+    INSTANTIATED,
+    INITIALISING,
+    STEPPING,    /* co-simulation */
+    IN_EVENT,    /* model exchange, in event mode */
+    INTEGRATING, /* model exchange, in continuous-time mode */
+    TERMINATED,
+    AFTER_ERROR
+} mode;
 
 #define WHEN(mode) (1 << (mode))
-#define BEFORE_THE_END (WHEN(INSTANTIATED) | WHEN(INITIALISING) | WHEN(STEPPING))
+#define EXCHANGING (WHEN(IN_EVENT) | WHEN(INTEGRATING))
+#define BEFORE_THE_END (WHEN(INSTANTIATED) | WHEN(INITIALISING) | WHEN(STEPPING) | EXCHANGING)
 #define NOT_AFTER_ERROR (BEFORE_THE_END | WHEN(TERMINATED))
 #define ALWAYS (NOT_AFTER_ERROR | WHEN(AFTER_ERROR))
 
@@ -43,6 +52,13 @@ typedef enum { INSTANTIATED, INITIALISING, STEPPING, TERMINATED, AFTER_ERROR } m
 #define MASK_EnterInitializationMode WHEN(INSTANTIATED)
 #define MASK_ExitInitializationMode WHEN(INITIALISING)
 #define MASK_DoStep WHEN(STEPPING)
+#define MASK_EnterEventMode WHEN(INTEGRATING)
+#define MASK_EnterContinuousTimeMode WHEN(IN_EVENT)
+#define MASK_EvaluateDiscreteStates (WHEN(INITIALISING) | WHEN(IN_EVENT))
+#define MASK_UpdateDiscreteStates WHEN(IN_EVENT)
+#define MASK_CompletedIntegratorStep WHEN(INTEGRATING)
+#define MASK_SetTime EXCHANGING
+#define MASK_SetContinuousStates WHEN(INTEGRATING)
 #define MASK_Terminate NOT_AFTER_ERROR
 #define MASK_Reset ALWAYS
 #define MASK_FreeInstance ALWAYS
@@ -76,6 +92,7 @@ typedef struct {
     string function;
     int allowed; /* modes in which it is allowed */
     int status;  /* status that it returns */
+    int rated;   /* true once the rates of the states are computed */
 } call;
 
 #endif

@@ -120,6 +120,8 @@ static int start(instance *it, message *why) {
     if (MODEL_DRAWS > 0) {
         seed_generator(&run->noise, (uint32_t)model_seed(&it->meant.model, &error));
         draw(&run->noise, next->draws);
+        /* Without communication points there is no noise. */
+        if (it->exchanges) memset(next->draws, 0, sizeof next->draws);
     }
     next->time = run->start_time;
     model_start(&it->meant.model, &run->inputs.groups, next->time, &next->state.groups, &error);
@@ -174,7 +176,7 @@ static void exit_initialisation(call *this) {
     if (this->instance->stale && !refresh(this->instance, &why)) {
         fail(this, &why);
     } else {
-        this->instance->run.mode = STEPPING;
+        this->instance->run.mode = this->instance->exchanges ? IN_EVENT : STEPPING;
     }
 }
 

@@ -236,7 +236,7 @@ static int check_run(const run *it, message *why) {
     if (it->mode == INSTANTIATED && it->begun) {
         return compose(why, "it has a state before the initialisation");
     }
-    if (it->mode == STEPPING && !it->begun) {
+    if (it->mode >= STEPPING && it->mode < TERMINATED && !it->begun) {
         return compose(why, "it has steps without a state");
     }
     if (it->begun) {
@@ -253,12 +253,14 @@ static int check_run(const run *it, message *why) {
     return is_truth(it->fault) || compose(why, "its fault is neither true nor false");
 }
 
-/* Checks that a run can have led to a state, whose numbers are finite. */
-static int check_reachable(const run *it, message *why) {
+/* Checks that a run can have led to a state, whose numbers are finite. In model exchange the host
+ * sets the state, so each can be reached. */
+static int check_reachable(const run *it, int exchanges, message *why) {
     const model_parameters *parameters = &it->parameters.model;
     const state_values *state = &it->moments[it->now].state;
     Error error = {0};
     model_check(parameters, &error);
+    if (exchanges) return !error.raised || compose(why, "%s", error.why.text);
     if (!error.raised && !is_bounded(state)) return compose(why, "it exceeds %g", LARGEST_STATE);
     model_check_state(parameters, &state->groups, &error);
     return !error.raised || compose(why, "%s", error.why.text);
@@ -272,8 +274,16 @@ static size_t largest_size(run *it) {
     return size;
 }
 
+/* Checks that a run is of the interface of an instance. */
+static int check_interface(const run *it, int exchanges, message *why) {
+    if (it->mode < STEPPING || it->mode >= TERMINATED || exchanges == (it->mode != STEPPING)) {
+        return 1;
+    }
+    return compose(why, "it is of an instance for %s", exchanges ? "co-simulation" : "model exchange");
+}
+
 /* Reads a saved state into a new run, and checks it. */
-static int take_saved(saved *state, run *it, message *why) {
+static int take_saved(saved *state, run *it, int exchanges, message *why) {
     tape from = {state->bytes, 0, content_size(state), 1};
     if (!pass_text(&from, MAGIC)) return compose(why, "the bytes are not a state");
     if (state->size > largest_size(it)) return compose(why, "it has missing or unknown parts");
@@ -282,19 +292,19 @@ static int take_saved(saved *state, run *it, message *why) {
     }
     if (!pass_text(&from, IDENTITY)) return compose(why, "not a state of %s", IDENTITY);
     pass_run(&from, it);
-    if (!check_run(it, why)) return 0;
+    if (!check_run(it, why) || !check_interface(it, exchanges, why)) return 0;
     if (from.place != from.size || !is_truth(it->begun)) {
         return compose(why, "it has missing or unknown parts");
     }
     if (it->begun && !MODEL_SAMPLED) it->moments[it->now].outputs_are = OUTDATED;
-    return !it->begun || check_reachable(it, why);
+    return !it->begun || check_reachable(it, exchanges, why);
 }
 
 static int restore(instance *it, saved *state, message *why) {
     run *wanted = malloc(sizeof *wanted);
     if (wanted == NULL) return compose(why, "out of memory");
     renew_run(wanted);
-    int good = take_saved(state, wanted, why) &&
+    int good = take_saved(state, wanted, it->exchanges, why) &&
                (!wanted->begun || adopt(it, &wanted->parameters, why));
     if (good) {
         it->run = *wanted;

@@ -14,6 +14,10 @@ static int adopt(instance *it, const parameter_values *values, message *why);
  * changed. */
 static int refresh(instance *it, message *why);
 
+/* Variables of model exchange: continuous states, their rates and event indicators. */
+static int is_exchanged(uint32_t reference);
+static double exchanged(call *this, uint32_t reference);
+
 /* Ports */
 
 static const char NO_PORT[] = "no %s has the value reference %u";
@@ -105,6 +109,7 @@ static double number_of(call *this, uint32_t reference, fmi_type type) {
     const run *run = &this->instance->run;
     const port *port = port_at(reference);
     if (port == NULL || (type != REAL && !passes_as(port, type))) {
+        if (type == REAL && is_exchanged(reference)) return exchanged(this, reference);
         get_unknown(this, version.types[type], &reference, 1);
         return 0.0;
     }
@@ -164,7 +169,7 @@ static void note_change(instance *it, int inputs, int parameters) {
     if (it->run.mode == INITIALISING) {
         it->stale = 1;
         now->outputs_are = OUTDATED;
-    } else if (it->run.mode == STEPPING) {
+    } else if (it->run.mode >= STEPPING) {
         if (inputs && MODEL_OUTPUTS_TAKE_INPUTS) now->outputs_are = OUTDATED;
         if (inputs && MODEL_DERIVE_TAKES_INPUTS) it->underived = 1;
         if (parameters && MODEL_OUTPUTS_TAKE_PARAMETERS) now->outputs_are = OUTDATED;
@@ -205,7 +210,7 @@ static setting begin_setting(call *this, fmi_type type, const uint32_t reference
 }
 
 static int is_settled(const run *run, const port *port) {
-    return port->variability == FIXED && run->mode == STEPPING;
+    return port->variability == FIXED && run->mode >= STEPPING;
 }
 
 /* Checks that the standard allows setting a port now; a fixed one may be set to its own value. */
@@ -220,7 +225,7 @@ static int check_settable(const run *run, const port *port, double number, messa
 /* A run must not begin with another parameter than the host wanted. */
 static void refuse_setting(setting *it, message *why) {
     it->good = 0;
-    if (it->has_parameters && it->call->instance->run.mode != STEPPING) {
+    if (it->has_parameters && it->call->instance->run.mode < STEPPING) {
         it->call->instance->run.fault = 1;
         fail(it->call, why);
     } else {
@@ -254,7 +259,7 @@ static void end_setting(setting *it) {
     run *run = &instance->run;
     message why;
     if (!it->good) return;
-    if (it->changes_parameters && run->mode == STEPPING &&
+    if (it->changes_parameters && run->mode >= STEPPING &&
         !adopt(instance, &instance->set_parameters, &why)) {
         refuse_setting(it, &why);
         return;
@@ -274,7 +279,7 @@ static int all_finite(const double values[], size_t n) {
 /* Sets all Real inputs at once if the references name them; otherwise returns false. */
 static int set_all_reals(call *this, const uint32_t references[], size_t n, const double values[]) {
     run *run = &this->instance->run;
-    if (n != REAL_INPUTS || INPUTS_HAVE_RANGES || run->mode != STEPPING ||
+    if (n != REAL_INPUTS || INPUTS_HAVE_RANGES || run->mode < STEPPING ||
         !are_all(references, input_references, n) || !all_finite(values, n)) {
         return 0;
     }

@@ -37,6 +37,14 @@ static void recover(call *this, double time) {
     come_to(this, time);
 }
 
+/* PythonFMU has no model exchange. */
+enum { EXCHANGES = 0 };
+
+static void *for_exchange(void *handle) { return handle; }
+
+#define EXCHANGED(name, allowed, wrong, parameters, ...)                                         \
+    FUNCTION(name, MASK_NotSupported, NULL, parameters, refuse_unsupported(&this, FMI_ERROR))
+
 #define FORWARDED(name, allowed, wrong, parameters, arguments, ...)                              \
     FUNCTION(name, allowed, wrong, parameters, c = this.instance->slave;                         \
              FORWARD(&this, name, parameters, arguments))
