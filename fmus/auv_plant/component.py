@@ -39,6 +39,12 @@ class Seen(NamedTuple):
     motion: PlantOutputs
 
 
+class Margins(NamedTuple):
+    """Distances from the limits at which the equations switch."""
+
+    tau: Annotated[Vector3, Variable(TAU, "Distance of the command from the limits of (3)")]
+
+
 class Outputs(NamedTuple):
     """Motion of the vehicle, and the applied force and moments."""
 
@@ -135,6 +141,24 @@ def seed(parameters: Parameters) -> int:
 def measured(parameters: Parameters, y: Vector3, n: Vector3) -> Vector3:
     """Add noise to the output y, from three independent standard normal numbers."""
     return plant.measure(y, n, parameters.noise.std)
+
+
+def rates(parameters: Parameters, state: PlantState, derived: Seen, inputs: Inputs) -> PlantState:
+    """Return the rates of the state."""
+    tau, water = plant.applied(parameters, inputs.tau), plant.flow(parameters, inputs.water)
+    return plant.state_rates(
+        parameters, state, derived.rotation, tau, inputs.tau_w, water, inputs.dwater
+    )
+
+
+def switches(parameters: Parameters, inputs: Inputs) -> Margins:
+    """Return the distances from the limits of (3)."""
+    return Margins(plant.margins(parameters, inputs.tau))
+
+
+def event(parameters: Parameters, state: PlantState, derived: Seen, inputs: Inputs) -> PlantState:
+    """Return the same motion over ground, in water whose velocity may have jumped."""
+    return plant.immersed(state, derived.rotation, plant.flow(parameters, inputs.water))
 
 
 def check_state(parameters: Parameters, state: PlantState) -> None:

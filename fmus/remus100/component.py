@@ -6,12 +6,12 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu import Refusal, Variable, __author__, __license__, __version__
 from auv_fmu.language.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
-from auv_fmu.language.vectors import Vector3, Vector6
+from auv_fmu.language.vectors import Vector3, Vector6, add
 from auv_fmu.paper import plant
 from auv_fmu.paper.euler import STEP
 from auv_fmu.remus import remus100
 from auv_fmu.remus.remus100 import Parameters, RemusState
-from auv_fmu.remus.tail import ACTUATOR, __citation__
+from auv_fmu.remus.tail import ACTUATOR, __citation__, limit_tail, margins
 
 H_MAX = STEP
 
@@ -28,6 +28,15 @@ class Inputs(NamedTuple):
     ]
     dwater: Annotated[
         Vector3, Variable(ACCELERATION, "Acceleration of the water in the earth frame")
+    ]
+
+
+class Margins(NamedTuple):
+    """Distances from the limits at which the equations switch."""
+
+    command: Annotated[Vector3, Variable(ACTUATOR, "Distance of the command from the limits")]
+    actuator: Annotated[
+        Vector3, Variable(ACTUATOR, "Distance of fins and propeller from their limits")
     ]
 
 
@@ -103,6 +112,30 @@ def seed(parameters: Parameters) -> int:
 def measured(parameters: Parameters, y: Vector3, n: Vector3) -> Vector3:
     """Add noise to the output y, from three independent standard normal numbers."""
     return plant.measure(y, n, parameters.noise.std)
+
+
+def rates(parameters: Parameters, state: RemusState, inputs: Inputs) -> RemusState:
+    """Return the rates of the state."""
+    command, water, dwater = inputs
+    return remus100.rates(parameters, state, command, water, dwater)
+
+
+def switches(parameters: Parameters, state: RemusState, inputs: Inputs) -> Margins:
+    """Return the distances from the limits of fins and propeller."""
+    return Margins(
+        margins(parameters.tail, inputs.command), margins(parameters.tail, state.actuator)
+    )
+
+
+def event(parameters: Parameters, state: RemusState, inputs: Inputs) -> RemusState:
+    """Return the same motion over ground, in water whose velocity may have jumped."""
+    return RemusState(
+        state.position,
+        state.euler,
+        state.nu,
+        limit_tail(parameters.tail, state.actuator),
+        add(parameters.current, inputs.water),
+    )
 
 
 def check_state(parameters: Parameters, state: RemusState) -> None:

@@ -69,6 +69,15 @@ def neg_diag(D: Vector3, a: Vector3) -> Vector3:
     return -D[0] * a[0], -D[1] * a[1], -D[2] * a[2]
 
 
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    """Cross product a x b."""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
 def distance(a: Vector3, b: Vector3) -> float:
     """The norm of a - b."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]

@@ -49,6 +49,17 @@ def limit_all(tau: Vector3, tau_min: Vector3, tau_max: Vector3) -> Vector3:
     )
 
 
+def margin(tau_k: float, tau_min: float, tau_max: float) -> float:
+    """Distance of a command from the nearer limit of (3), negative beyond it.
+
+    Args:
+        tau_k: commanded force [N] or moment [N.m].
+        tau_min, tau_max: limits in the same unit, tau_min < tau_max.
+
+    """
+    return min(tau_max - tau_k, tau_k - tau_min)
+
+
 class Drive(NamedTuple):
     """Force and moments (u, q, r) of the actuators within a step [N, N.m]."""
 
@@ -69,6 +80,18 @@ def respond(before: float, tau_k: float, T: float, h: float) -> float:
 
     """
     return tau_k + (before - tau_k) * exp(-h / T) if T else tau_k
+
+
+def follow(tau_a: float, tau_k: float, T: float) -> float:
+    """Rate of the output of an actuator of first order [N/s, N.m/s]; 0 without a lag.
+
+    Args:
+        tau_a: output [N, N.m].
+        tau_k: command within the limits of (3).
+        T: time constant [s]; 0: no lag.
+
+    """
+    return (tau_k - tau_a) / T if T else 0.0
 
 
 def mean_response(before: float, tau_k: float, T: float, h: float) -> float:

@@ -10,10 +10,11 @@ water that moves, actuators with dynamics, and an integrator of fourth order.
 from __future__ import annotations
 
 from enum import IntEnum
+from math import cos, sin
 from random import Random
 from typing import Annotated, NamedTuple
 
-from auv_fmu.language.quantities import ETA, LAG, NU, VELOCITY
+from auv_fmu.language.quantities import ETA, LAG, NU, POSITION, TAU, VELOCITY
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import (
     Rotation,
@@ -22,9 +23,10 @@ from auv_fmu.language.vectors import (
     Vector6,
     add,
     add_scaled,
+    cross,
     sub,
 )
-from auv_fmu.paper.actuators import Drive, Limits, drive, given, limit_all
+from auv_fmu.paper.actuators import Drive, Limits, drive, follow, given, limit_all, margin
 from auv_fmu.paper.attitude import (
     euler_from_rotation,
     euler_without_roll,
@@ -46,6 +48,9 @@ NU_0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 #: Largest standard deviation [m]: with it, no finite position becomes an infinite measurement.
 _FARTHEST = 1e6
+
+#: Rate at which an error of the quaternion's length decays, where a solver makes one [1/s].
+_NORMALISING = 0.5
 
 _NO_FORCE = (0.0, 0.0, 0.0)
 _STILL = (0.0, 0.0, 0.0)
@@ -133,11 +138,14 @@ class Parameters(NamedTuple):
 class PlantState(NamedTuple):
     """Motion of the vehicle, with its actuators and the water."""
 
-    position: Vector3  #: centre of mass (x, y, z) [m], earth frame
-    quaternion: Vector4  #: attitude, body to earth, scalar first
-    nu_r: Vector6  #: (u, v, w, p, q, r) through the water [m/s, rad/s], body frame
-    tau: Vector3  #: (tau_u, tau_q, tau_r) that acted at the end of the last step [N, N.m]
-    water: Vector3  #: velocity of the water that nu_r is through [m/s], earth frame
+    position: Annotated[Vector3, Variable(POSITION, "Centre of mass in the earth frame")]
+    quaternion: Annotated[Vector4, Variable("1", "Attitude, body to earth, scalar first")]
+    nu_r: Annotated[Vector6, Variable(NU, "Velocity through the water in the body frame")]
+    #: at the end of the last step
+    tau: Annotated[Vector3, Variable(TAU, "Force and moments that act, for actuators with a lag")]
+    water: Annotated[
+        Vector3, Variable(VELOCITY, "Velocity of the water that nu_r is through, earth frame")
+    ]
 
 
 class PlantOutputs(NamedTuple):
@@ -305,6 +313,61 @@ def rates(
     return Rates(velocity, (0.0, 0.0, dtheta, dpsi), dnu)
 
 
+def state_rates(
+    parameters: Parameters,
+    state: PlantState,
+    rotation: Rotation,
+    tau: Vector3,
+    tau_w: Vector6,
+    water: Vector3,
+    dwater: Vector3,
+) -> PlantState:
+    """Rates of the whole state, for a solver with steps of its own.
+
+    The velocity of the state is through water that has accelerated by dwater since the last jump.
+    If the water moves differently, the vehicle is in the present water nevertheless: with v_s and v
+    through the water of the state and the present one, the motion over ground gives
+
+        dv_s/dt + omega x v_s = dv/dt + omega x v.
+
+    The length of the quaternion is drawn back to one.
+
+    Args:
+        parameters: of the plant.
+        state, rotation: of the vehicle.
+        tau: command (tau_u, tau_q, tau_r) after the limits of (3) [N, N.m].
+        tau_w: disturbance (u, v, w, p, q, r) [N, N.m].
+        water: velocity of the water [m/s], earth frame.
+        dwater: its acceleration [m/s2], earth frame.
+
+    """
+    now = immersed(state, rotation, water)
+    acting = given(state.tau, tau, parameters.T)
+    rate = rates(parameters.vehicle, parameters.roll, now, rotation, acting, tau_w)
+    _, _, _, p, q, r = state.nu_r
+    if not parameters.roll.rolls:
+        # The rate of the body about its axis that keeps the starboard axis level.
+        _, theta, _ = euler_without_roll(rotation)
+        p = -r * sin(theta) / cos(theta)
+    x, y, z = cross((p, q, r), rotate_back(rotation, sub(state.water, water)))
+    a, b, c, d = state.quaternion
+    da, db, dc, dd = quaternion_rates(state.quaternion, (p, q, r))
+    k = _NORMALISING * (1.0 - (a * a + b * b + c * c + d * d))
+    du, dv, dw, dp, dq, dr = rate.nu_r
+    T_u, T_q, T_r = parameters.T
+    return PlantState(
+        rate.position,
+        (da + k * a, db + k * b, dc + k * c, dd + k * d),
+        (du + x, dv + y, dw + z, dp, dq, dr),
+        (
+            follow(state.tau[0], tau[0], T_u),
+            follow(state.tau[1], tau[1], T_q),
+            follow(state.tau[2], tau[2], T_r),
+        ),
+        dwater,
+    )
+
+
 def moved(
     roll: RollAxis, state: PlantState, rotation: Rotation, rate: Rates, tau: Vector3, h: float
 ) -> PlantState:
@@ -431,6 +494,16 @@ def flow(parameters: Parameters, water: Vector3) -> Vector3:
 def applied(parameters: Parameters, tau: Vector3) -> Vector3:
     """Equation (3): a command (tau_u, tau_q, tau_r) within the limits [N, N.m]."""
     return limit_all(tau, parameters.limits.tau_min, parameters.limits.tau_max)
+
+
+def margins(parameters: Parameters, tau: Vector3) -> Vector3:
+    """Distances of a command (tau_u, tau_q, tau_r) from the limits of (3) [N, N.m]."""
+    lower, upper = parameters.limits
+    return (
+        margin(tau[0], lower[0], upper[0]),
+        margin(tau[1], lower[1], upper[1]),
+        margin(tau[2], lower[2], upper[2]),
+    )
 
 
 def actuation(parameters: Parameters, state: PlantState, tau: Vector3) -> Vector3:

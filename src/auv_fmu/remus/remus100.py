@@ -12,8 +12,8 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu.language.arrays import Vector
 from auv_fmu.language.linear_algebra import solve
-from auv_fmu.language.quantities import ETA, NU, VELOCITY
-from auv_fmu.language.variable import Variable
+from auv_fmu.language.quantities import ETA, EULER, NU, POSITION, VELOCITY
+from auv_fmu.language.variable import Refusal, Variable
 from auv_fmu.language.vectors import Vector3, Vector6, add, add_scaled
 from auv_fmu.paper.attitude import rotate, rotation_from_euler
 from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
@@ -28,7 +28,7 @@ from auv_fmu.remus.hull import (
     lift_and_drag,
     righting,
 )
-from auv_fmu.remus.tail import FASTEST, FASTEST_TURN, Tail, forces, limit_tail
+from auv_fmu.remus.tail import ACTUATOR, FASTEST, FASTEST_TURN, Tail, forces, limit_tail
 
 
 class TooFast(ArithmeticError):
@@ -64,11 +64,12 @@ class Parameters(NamedTuple):
 class RemusState(NamedTuple):
     """Motion of the vehicle, its fins and its propeller."""
 
-    position: Vector3  #: centre of buoyancy (x, y, z) [m], earth frame
-    euler: Vector3  #: roll, pitch, yaw [rad]
-    nu: Vector6  #: (u, v, w, p, q, r) over ground [m/s, rad/s], body frame
-    actuator: Vector3  #: (delta_r, delta_s, n) [rad, rad, rad/s]
-    water: Vector3  #: velocity of the water at the end of the last step [m/s], earth frame
+    position: Annotated[Vector3, Variable(POSITION, "Centre of buoyancy in the earth frame")]
+    euler: Annotated[Vector3, Variable(EULER, "Roll, pitch and yaw")]
+    nu: Annotated[Vector6, Variable(NU, "Velocity over ground in the body frame")]
+    actuator: Annotated[Vector3, Variable(ACTUATOR, "What rudder, stern planes and propeller are")]
+    #: at the end of the last step
+    water: Annotated[Vector3, Variable(VELOCITY, "Velocity of the water in the earth frame")]
 
 
 def water_in_body(psi: float, water: Vector3) -> Vector3:
@@ -219,6 +220,63 @@ def carried(state: RemusState, dwater: Vector3, h: float) -> RemusState:
         (u + h * x, v + h * y, w + h * z, p, q, r),
         state.actuator,
         add_scaled(state.water, h, dwater),
+    )
+
+
+def pull(now: float, command: float, T: float, limit: float) -> float:
+    """Rate of a first-order fin or propeller, which stops at its limit.
+
+    Args:
+        now: angle [rad] or speed [rad/s].
+        command: for it.
+        T: time constant [s].
+        limit: of its size, in the unit of `now`.
+
+    """
+    rate = (command - now) / T
+    stops = (now >= limit and rate > 0.0) or (now <= -limit and rate < 0.0)
+    return 0.0 if stops else rate
+
+
+def rates(
+    parameters: Parameters, state: RemusState, command: Vector3, water: Vector3, dwater: Vector3
+) -> RemusState:
+    """Rates of the state, for a solver with steps of its own.
+
+    Args:
+        parameters: of the vehicle.
+        state: of the vehicle.
+        command: (delta_r, delta_s, n) [rad, rad, rad/s].
+        water: velocity of the water, beside `current` [m/s], earth frame.
+        dwater: its acceleration [m/s2], earth frame.
+
+    Raises:
+        Refusal: fins or propeller have no time constant, so no rate.
+
+    """
+    T_delta, T_n, tail = parameters.T_delta, parameters.T_n, parameters.tail
+    if not (T_delta > 0.0 and T_n > 0.0):
+        raise Refusal("model exchange needs a fin.T and a propeller.T above 0")
+    delta_r, delta_s, n = state.actuator
+    actuator = limit_tail(tail, state.actuator)
+    state = RemusState(
+        state.position, state.euler, state.nu, actuator, add(parameters.current, water)
+    )
+    check_speed(state)
+    du, dv, dw, dp, dq, dr = accelerations(parameters, inertia(parameters.hull), state)
+    phi, theta, psi = state.euler
+    u, v, w, p, q, r = state.nu
+    x, y, z = water_in_body(psi, dwater)
+    return RemusState(
+        rotate(rotation_from_euler(phi, theta, psi), (u, v, w)),
+        euler_rates(phi, theta, p, q, r),
+        (du + x, dv + y, dw + z, dp, dq, dr),
+        (
+            pull(delta_r, command[0], T_delta, tail.delta_max),
+            pull(delta_s, command[1], T_delta, tail.delta_max),
+            pull(n, command[2], T_n, tail.n_max),
+        ),
+        dwater,
     )
 
 

@@ -132,6 +132,12 @@ def limit_tail(tail: Tail, actuator: Vector3) -> Vector3:
     )
 
 
+def margins(tail: Tail, actuator: Vector3) -> Vector3:
+    """Distances of (delta_r, delta_s, n) from the limits [rad, rad, rad/s], negative beyond."""
+    delta_r, delta_s, n = actuator
+    return tail.delta_max - abs(delta_r), tail.delta_max - abs(delta_s), tail.n_max - abs(n)
+
+
 def fin_lift(tail: Tail, lift: float, squared_speed: float) -> float:
     """Force of a pair of fins per angle [N/rad].
 
