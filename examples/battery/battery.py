@@ -49,8 +49,14 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Charge, and voltages of the pairs."""
 
-    charge: float  #: as a fraction of the capacity
-    v: Annotated[Vector, 2]  #: voltages of the pairs [V]
+    charge: Annotated[float, Variable("1", "Charge as a fraction of the capacity")]
+    v: Annotated[Vector, 2, Variable("V", "Voltage of a pair")]
+
+
+class Margins(NamedTuple):
+    """Distance at which the current stops."""
+
+    charge: Annotated[float, Variable("1", "From the charge to empty or full")]
 
 
 class Outputs(NamedTuple):
@@ -81,6 +87,17 @@ def update(parameters: Parameters, state: State, derived: float, h: float) -> St
         for v, R, C in zip(state.v, parameters.R, parameters.C)
     )
     return State(charge, v)
+
+
+def rates(parameters: Parameters, state: State, derived: float) -> State:
+    """Rates of the state."""
+    v = Vector((R * derived - v) / (R * C) for v, R, C in zip(state.v, parameters.R, parameters.C))
+    return State(-derived / (3600 * parameters.capacity), v)
+
+
+def switches(state: State) -> Margins:
+    """Distance from empty or full."""
+    return Margins(min(state.charge, 1.0 - state.charge))
 
 
 def outputs(parameters: Parameters, state: State, derived: float) -> Outputs:

@@ -49,6 +49,19 @@ class State(NamedTuple):
     rests: bool
 
 
+class Motion(NamedTuple):
+    """Motion between bounces."""
+
+    h: Annotated[float, Variable("m", "Height of the ball")]
+    v: Annotated[float, Variable("m/s", "Velocity of the ball, upwards")]
+
+
+class Margins(NamedTuple):
+    """Distance at which the ball bounces."""
+
+    ground: Annotated[float, Variable("m", "From the ground to the ball, unless it rests")]
+
+
 class Outputs(NamedTuple):
     """Outputs of the ball."""
 
@@ -67,12 +80,27 @@ def update(parameters: Parameters, state: State, h: float) -> State:
         return state
     height = state.h + h * state.v
     velocity = state.v + h * parameters.g
-    if height > 0 or velocity >= 0:
-        return State(height, velocity, False)
-    rebound = -velocity * parameters.e
+    return event(parameters, State(height, velocity, False))
+
+
+def event(parameters: Parameters, state: State) -> State:
+    """The state after a bounce, if the ball falls at or below the ground."""
+    if state.rests or state.h > 0 or state.v >= 0:
+        return state
+    rebound = -state.v * parameters.e
     if rebound < parameters.v_min:
         return State(GROUND, 0.0, True)
     return State(GROUND, rebound, False)
+
+
+def rates(parameters: Parameters, state: State) -> Motion:
+    """Rates of the motion."""
+    return Motion(0.0, 0.0) if state.rests else Motion(state.v, parameters.g)
+
+
+def switches(state: State) -> Margins:
+    """Distance from the ground."""
+    return Margins(1.0 if state.rests else state.h)
 
 
 def outputs(state: State) -> Outputs:

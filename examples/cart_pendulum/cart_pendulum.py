@@ -43,8 +43,8 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Motion of cart and pendulum."""
 
-    q: Annotated[Vector, 2]  #: position [m] and angle [rad]
-    dq: Annotated[Vector, 2]  #: their rates
+    q: Annotated[Vector, 2, Variable({"p": "m", "angle": "rad"}, "Position and angle")]
+    dq: Annotated[Vector, 2, Variable({"p": "m/s", "angle": "rad/s"}, "Their rates")]
 
 
 class Outputs(NamedTuple):
@@ -64,26 +64,25 @@ def start(parameters: Parameters) -> State:
 
 def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
     """State after a step of h seconds with a held force."""
-    M, m, l = parameters.M, parameters.m, parameters.l
-
-    def acceleration(q: Annotated[Vector, 2], dq: Annotated[Vector, 2]) -> Annotated[Vector, 2]:
-        s, c = sin(q[1]), cos(q[1])
-        mass = Matrix(((M + m, m * l * c), (m * l * c, m * l * l)))
-        force = inputs.u - parameters.c * dq[0] + m * l * s * dq[1] * dq[1]
-        return solve(mass, Vector((force, m * parameters.g * l * s)))
-
-    q, v1 = state.q, state.dq
-    a1 = acceleration(q, v1)
-    v2 = v1 + h / 2 * a1
-    a2 = acceleration(q + h / 2 * v1, v2)
-    v3 = v1 + h / 2 * a2
-    a3 = acceleration(q + h / 2 * v2, v3)
-    v4 = v1 + h * a3
-    a4 = acceleration(q + h * v3, v4)
+    q, dq = state.q, state.dq
+    k1 = rates(parameters, state, inputs)
+    k2 = rates(parameters, State(q + h / 2 * k1.q, dq + h / 2 * k1.dq), inputs)
+    k3 = rates(parameters, State(q + h / 2 * k2.q, dq + h / 2 * k2.dq), inputs)
+    k4 = rates(parameters, State(q + h * k3.q, dq + h * k3.dq), inputs)
     return State(
-        q + h / 6 * (v1 + 2 * v2 + 2 * v3 + v4),
-        v1 + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4),
+        q + h / 6 * (k1.q + 2 * k2.q + 2 * k3.q + k4.q),
+        dq + h / 6 * (k1.dq + 2 * k2.dq + 2 * k3.dq + k4.dq),
     )
+
+
+def rates(parameters: Parameters, state: State, inputs: Inputs) -> State:
+    """Rates of the state, by Lagrange's equations."""
+    M, m, l = parameters.M, parameters.m, parameters.l
+    q, dq = state.q, state.dq
+    s, c = sin(q[1]), cos(q[1])
+    mass = Matrix(((M + m, m * l * c), (m * l * c, m * l * l)))
+    force = inputs.u - parameters.c * dq[0] + m * l * s * dq[1] * dq[1]
+    return State(dq, solve(mass, Vector((force, m * parameters.g * l * s))))
 
 
 def outputs(parameters: Parameters, state: State) -> Outputs:

@@ -33,7 +33,7 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """Value of x."""
 
-    x: float
+    x: Annotated[float, Variable("1", "Value")]
 
 
 class Outputs(NamedTuple):
@@ -50,7 +50,12 @@ def start(parameters: Parameters) -> State:
 
 def update(parameters: Parameters, state: State, h: float) -> State:
     """State after a step of h seconds."""
-    return State(state.x + h * (-parameters.k * state.x))
+    return State(state.x + h * rates(parameters, state).x)
+
+
+def rates(parameters: Parameters, state: State) -> State:
+    """Rate of the state."""
+    return State(-parameters.k * state.x)
 
 
 def outputs(parameters: Parameters, state: State, t: float) -> Outputs:

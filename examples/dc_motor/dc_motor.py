@@ -44,7 +44,9 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Current, speed and angle."""
 
-    x: Annotated[Vector, 3]  #: [A], [rad/s], [rad]
+    x: Annotated[
+        Vector, 3, Variable({"i": "A", "speed": "rad/s", "angle": "rad"}, "Motion of the motor")
+    ]
 
 
 class Outputs(NamedTuple):
@@ -73,6 +75,11 @@ def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> St
 def outputs(state: State) -> Outputs:
     """Outputs of the motor."""
     return Outputs(state.x[0], state.x[1], state.x[2])
+
+
+def rates(parameters: Parameters, state: State, inputs: Inputs) -> State:
+    """Rates of the state."""
+    return State(_rate(parameters, inputs, state.x))
 
 
 def _rate(parameters: Parameters, inputs: Inputs, x: Annotated[Vector, 3]) -> Annotated[Vector, 3]:

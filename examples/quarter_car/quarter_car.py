@@ -50,7 +50,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Heights and velocities."""
 
-    x: Annotated[Vector, 4]  #: body [m], its velocity [m/s], wheel, its velocity
+    x: Annotated[Vector, 4, Variable({"z1": "m", "v1": "m/s", "z2": "m", "v2": "m/s"}, "Motion")]
 
 
 class Outputs(NamedTuple):
@@ -86,6 +86,14 @@ def update(
     x, A = state.x, derived
     push = Vector((0.0, 0.0, 0.0, h * parameters.k_tyre / parameters.m_wheel * inputs.road))
     return State(solve(IDENTITY - h / 2 * A, x + h / 2 * (A @ x) + push))
+
+
+def rates(
+    parameters: Parameters, state: State, derived: Annotated[Matrix, 4, 4], inputs: Inputs
+) -> State:
+    """Rates of the state."""
+    push = parameters.k_tyre / parameters.m_wheel * inputs.road
+    return State(derived @ state.x + Vector((0.0, 0.0, 0.0, push)))
 
 
 def outputs(

@@ -45,7 +45,7 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """State of the system."""
 
-    x: Annotated[Vector, 3]
+    x: Annotated[Vector, 3, Variable("1", "State")]
 
 
 class Outputs(NamedTuple):
@@ -61,8 +61,12 @@ def start(parameters: Parameters) -> State:
 
 def update(parameters: Parameters, state: State, inputs: Inputs, h: float) -> State:
     """State after a step of h seconds with held inputs."""
-    x = state.x
-    return State(x + h * (parameters.A @ x + parameters.B @ inputs.u))
+    return State(state.x + h * rates(parameters, state, inputs).x)
+
+
+def rates(parameters: Parameters, state: State, inputs: Inputs) -> State:
+    """Rates of the state."""
+    return State(parameters.A @ state.x + parameters.B @ inputs.u)
 
 
 def outputs(parameters: Parameters, state: State, inputs: Inputs) -> Outputs:

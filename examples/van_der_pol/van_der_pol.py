@@ -34,8 +34,8 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """Motion of the oscillator."""
 
-    x0: float  #: deflection
-    x1: float  #: its rate [1/s]
+    x0: Annotated[float, Variable("1", "Deflection")]
+    x1: Annotated[float, Variable("1/s", "Rate of the deflection")]
 
 
 class Outputs(NamedTuple):
@@ -52,9 +52,14 @@ def start(parameters: Parameters) -> State:
 
 def update(parameters: Parameters, state: State, h: float) -> State:
     """State after a step of h seconds."""
+    rate = rates(parameters, state)
+    return State(state.x0 + h * rate.x0, state.x1 + h * rate.x1)
+
+
+def rates(parameters: Parameters, state: State) -> State:
+    """Rates of the state."""
     x0, x1 = state.x0, state.x1
-    acceleration = parameters.mu * ((1 - x0 * x0) * x1) - x0
-    return State(x0 + h * x1, x1 + h * acceleration)
+    return State(x1, parameters.mu * ((1 - x0 * x0) * x1) - x0)
 
 
 def outputs(state: State) -> Outputs:

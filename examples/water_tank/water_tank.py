@@ -43,7 +43,13 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Level."""
 
-    level: float  #: above the hole [m]
+    level: Annotated[float, Variable("m", "Level above the hole")]
+
+
+class Margins(NamedTuple):
+    """Distances from the levels at which the equation switches."""
+
+    rim: Annotated[float, Variable("m", "From the level to the rim")]
 
 
 class Outputs(NamedTuple):
@@ -61,13 +67,29 @@ def start(parameters: Parameters) -> State:
 
 def derive(parameters: Parameters, state: State) -> float:
     """The flow through the hole [m3/s], by Torricelli's law."""
-    return parameters.hole * sqrt(2 * GRAVITY * state.level)
+    return parameters.hole * sqrt(2 * GRAVITY * max(state.level, 0.0))
 
 
 def update(parameters: Parameters, state: State, derived: float, inputs: Inputs, h: float) -> State:
     """State after a step of h seconds with a held inflow."""
     level = state.level + h * (inputs.inflow - derived) / parameters.area
     return State(min(max(level, 0.0), parameters.rim))
+
+
+def rates(parameters: Parameters, state: State, derived: float, inputs: Inputs) -> State:
+    """Rate of the level, which stops at the rim."""
+    rate = (inputs.inflow - derived) / parameters.area
+    return State(min(rate, 0.0) if state.level >= parameters.rim else rate)
+
+
+def switches(parameters: Parameters, state: State) -> Margins:
+    """Distance from the rim."""
+    return Margins(parameters.rim - state.level)
+
+
+def event(parameters: Parameters, state: State) -> State:
+    """The state at an event: what is above the rim has spilled over."""
+    return State(min(max(state.level, 0.0), parameters.rim))
 
 
 def outputs(parameters: Parameters, state: State, derived: float) -> Outputs:
