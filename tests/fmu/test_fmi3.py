@@ -164,7 +164,7 @@ CREATIONS = {
         ("earlyReturnAllowed and variables for intermediate updates", False),
     )
 } | {
-    ("fmi3InstantiateModelExchange", "anything"): ((None,), ()),
+    ("fmi3InstantiateModelExchange", "a component with rates"): ((None,), ()),
     ("fmi3InstantiateScheduledExecution", "anything"): ((None,), (None, None, None)),
 }  # fmt: skip
 

@@ -293,7 +293,8 @@ class Trial:
             assert _same(variable, found, value), f"{variable.name} is {found}, not {value}"
         allowed = {variable.name for variable in taken} | {"fault"}
         if self.state in ("initialising", "stepping"):
-            allowed |= {v.name for v in self.host.description.of("output")}
+            for causality in ("output", "local"):
+                allowed |= {v.name for v in self.host.description.of(causality)}
         changed = {name for name in before if after[name] != before[name]}
         assert changed <= allowed, f"{sorted(changed - allowed)} changed"
         return True

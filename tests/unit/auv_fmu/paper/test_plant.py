@@ -136,6 +136,58 @@ def test_vehicle_that_passes_the_vertical_keeps_a_unit_quaternion_and_does_not_j
     assert largest_move < 0.04
 
 
+def test_rates_are_newtons_in_water_that_moves_as_it_likes():
+    """Against an integration of the velocity over ground in the earth frame.
+
+    The water of the state follows the acceleration that is said, and the water moves otherwise.
+    """
+    said, tau, tau_w = (0.02, -0.01, 0.03), (20.0, 1.0, -2.0), (1.0, 0.0, -1.0, 0.2, 0.0, 0.1)
+    lagging = PARAMETERS._replace(T=(0.7, 0.0, 2.0))
+    first = started((1.0, 2.0, 3.0, 0.3, -0.2, 0.5), (0.5, 0.1, -0.1, 0.2, 0.1, 0.1), lagging)
+
+    def water(t):
+        return np.array((0.3 * sin(0.5 * t), 0.2 * cos(t) - 0.2, 0.1 * t))
+
+    def rates(t, x):
+        state = plant.PlantState(*(tuple(x[i:j]) for i, j in pairwise((0, 3, 7, 13, 16, 19))))
+        rotation = rotation_from_quaternion(state.quaternion)
+        rate = plant.state_rates(lagging, state, rotation, tau, tau_w, tuple(water(t)), said)
+        return np.concatenate(rate)
+
+    def earth_fixed(t, x):
+        velocity, R, omega = x[3:6], x[6:15].reshape(3, 3), x[15:18]
+        through = R.T @ (velocity - water(t))
+        acting = (tau[0] * (1 - exp(-t / 0.7)), tau[1], tau[2] * (1 - exp(-t / 2.0)))
+        columns = tuple(map(tuple, R.T))
+        accelerations = plant.accelerations_6dof(
+            VEHICLE, ROLL, (*through, *omega), columns, acting, tau_w
+        )
+        turning = np.cross(omega, np.eye(3)).T
+        force = R @ (np.array(accelerations[:3]) + np.cross(omega, through)) + said
+        return np.concatenate((velocity, force, (R @ turning).ravel(), accelerations[3:]))
+
+    R = np.transpose(rotation_from_quaternion(first.quaternion))
+    begun = np.concatenate((first.position, R @ first.nu_r[:3], R.ravel(), first.nu_r[3:]))
+    found = solve_ivp(rates, (0.0, 20.0), np.concatenate(first), "DOP853", rtol=1e-10).y[:, -1]
+    expected = solve_ivp(earth_fixed, (0.0, 20.0), begun, "DOP853", rtol=1e-10).y[:, -1]
+    state = plant.PlantState(*(tuple(found[i:j]) for i, j in pairwise((0, 3, 7, 13, 16, 19))))
+    rotation = np.transpose(rotation_from_quaternion(state.quaternion))
+    np.testing.assert_allclose(state.position, expected[:3], atol=1e-6)
+    velocity = rotation @ state.nu_r[:3] + state.water
+    np.testing.assert_allclose(velocity, expected[3:6], atol=1e-7)
+    np.testing.assert_allclose(rotation.ravel(), expected[6:15], atol=1e-7)
+    np.testing.assert_allclose(state.water, 20.0 * np.array(said), atol=1e-9)
+
+
+def test_length_of_the_quaternion_is_drawn_back():
+    state = started((0.0, 0.0, 0.0, 0.3, 0.2, 0.1), (0.0, 0.0, 0.0, 1.0, 0.5, -0.5))
+    for stretch in (0.99, 1.01):
+        longer = state._replace(quaternion=tuple(stretch * a for a in state.quaternion))
+        rotation = rotation_from_quaternion(state.quaternion)
+        rate = plant.state_rates(PARAMETERS, longer, rotation, UNDRIVEN, AT_REST, *[UNDRIVEN] * 2)
+        assert np.dot(rate.quaternion, longer.quaternion) * (stretch - 1.0) < 0.0
+
+
 def test_noise_is_scaled_by_its_standard_deviation():
     assert plant.measure((1.0, 2.0, 3.0), (2.0, -3.0, 4.0), 0.5) == (2.0, 0.5, 5.0)
     assert plant.measure((1.0, 2.0, 3.0), (2.0, -3.0, 4.0), 0.0) == (1.0, 2.0, 3.0)

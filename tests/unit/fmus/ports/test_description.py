@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from math import pi
-from typing import Any
 from xml.etree import ElementTree
 
 from hypothesis import example, given
 from hypothesis import strategies as st
 
 from auv_fmu import __version__
-from fmus.ports.definition import DefaultExperiment, Definition, Origin
+from fmus.ports.definition import DefaultExperiment, Model, Origin
 from fmus.ports.description import (
     complete,
     dependencies,
@@ -242,11 +241,10 @@ def canonical(content: str | bytes) -> str:
 
 
 def test_description_of_fmi_3_follows_from_the_ports():
-    nothing: Any = None
     origin = Origin("Me", "MIT", "1.2", "From a book")
     experiment = DefaultExperiment(3600.0, 10.0)
-    definition = Definition("It", "A thing", origin, PORTS_3, experiment, nothing, (), nothing)
-    found = fmi3_description(definition, "{1}")
+    model = Model("It", "A thing", origin, PORTS_3, experiment)
+    found = fmi3_description(model, "{1}")
     assert canonical(found) == canonical(DESCRIPTION_3)
 
 

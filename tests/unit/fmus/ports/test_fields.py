@@ -6,7 +6,7 @@ from enum import IntEnum
 from itertools import chain
 from math import inf, nan
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple, cast
+from typing import Annotated, Any, NamedTuple
 
 import pytest
 from fmpy.validation import validate_fmu
@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from auv_fmu import POSITIVE, Matrix, Variable, Vector
-from fmus.ports.definition import DefaultExperiment, Definition, Origin
+from fmus.ports.definition import DefaultExperiment, Model, Origin
 from fmus.ports.description import fmi2_description, fmi3_description
 from fmus.ports.fields import declared
 from fmus.ports.groups import ParameterSet
@@ -320,10 +320,7 @@ def test_what_is_declared_can_be_described(folder, causality, fields):
         assert len(str(flaw).splitlines()) == 1
         assert flaw.place[0] in ("Fields", "Odd", "Far")
         return
-    nothing, experiment = cast(Any, None), DefaultExperiment(100.0, 0.02)
-    definition = Definition(
-        "It", "A thing", Origin(), tuple(found), experiment, nothing, (), nothing
-    )
+    model = Model("It", "A thing", Origin(), tuple(found), DefaultExperiment(100.0, 0.02))
     for describe in (fmi2_description, fmi3_description):
-        (folder / "modelDescription.xml").write_bytes(describe(definition, "{1}"))
+        (folder / "modelDescription.xml").write_bytes(describe(model, "{1}"))
         assert validate_fmu(str(folder)) == []
