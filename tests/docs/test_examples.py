@@ -35,8 +35,8 @@ from support.tiers import slow
 pytestmark = pytest.mark.usefixtures("workplace")
 
 (
-    ACCURACY, BATCH, DERIVATIVES, EVENTS, EXAMPLES, EXPORT, LEARN, LIBCOSIM, PARAMETERS, PYTHON,
-    ROS, SCENARIOS, STEP, STUDIES, TEST_ONE, TRAJECTORIES, VEHICLES,
+    ACCURACY, BATCH, DERIVATIVES, EVENTS, EXAMPLES, EXCHANGE, EXPORT, LEARN, LIBCOSIM, PARAMETERS,
+    PYTHON, ROS, SCENARIOS, STEP, STUDIES, TEST_ONE, TRAJECTORIES, VEHICLES,
 ) = (
     DOCS / f"{name}.md"
     for name in (
@@ -45,6 +45,7 @@ pytestmark = pytest.mark.usefixtures("workplace")
         "how-to/derivatives",
         "how-to/events",
         "reference/examples",
+        "how-to/hosts/model-exchange",
         "how-to/export-results",
         "how-to/learn",
         "how-to/hosts/libcosim",
@@ -133,6 +134,24 @@ def test_functions_of_casadi_give_the_derivatives_of_the_page(capsys):
 def answers(page: Path, number: int) -> list[str]:
     """Output of an example, as the page shows it."""
     return blocks(page, "text")[number].text.splitlines()
+
+
+def test_solvers_of_other_tools_run_fmus_for_model_exchange(native, capsys):
+    Path("dist").mkdir()
+    shutil.copy(native / "AuvPlant.fmu", "dist")
+    [settled] = executed(EXCHANGE, capsys)
+    assert float(settled) == pytest.approx(10.0 / 30.0, rel=1e-4)
+    pytest.importorskip("pathsim_fmi")
+    script = DOCS.parent / "examples" / "dc_motor" / "dc_motor.py"
+    assert main(["build", str(script), "--kind", "native", "--out", "dist"]) == 0
+    capsys.readouterr()
+    *_, speed = executed(EXCHANGE, capsys, 1)
+    # di/dt = (12 - 1.5 i - 0.1 w) / 0.12, dw/dt = (0.1 i - 0.0005 w) / 0.005, for 2 s.
+    A = np.array([[-1.5 / 0.12, -0.1 / 0.12], [0.1 / 0.005, -0.0005 / 0.005]])
+    values, vectors = np.linalg.eig(A)
+    end = np.linalg.solve(-A, [100.0, 0.0])
+    w = (vectors @ (np.exp(2.0 * values) * np.linalg.solve(vectors, -end)) + end)[1].real
+    assert float(speed) == pytest.approx(w, rel=1e-3)
 
 
 def test_tests_of_one_fmu_pass_as_the_page_says(native, workplace):

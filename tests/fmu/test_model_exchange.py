@@ -224,6 +224,15 @@ def test_a_battery_stops_where_it_is_empty(built):
     assert set(rows["i"][rows["time"] > 1801]) == {0.0}
 
 
+def test_a_tank_stays_full_at_its_rim(built):
+    case = Case(400.0, {"inflow": 0.008})
+    rows = exchanged(built("water_tank", "2"), case, ["level", "overflows"])
+    full = rows["overflows"].astype(bool)
+    assert 0.1 < np.mean(full) < 0.9
+    assert rows["level"][full] == pytest.approx(1.0, abs=1e-9)
+    assert np.ptp(np.flatnonzero(full)) == np.count_nonzero(full) - 1
+
+
 @pytest.mark.parametrize(
     ("name", "ports", "limit", "indicator"),
     [
@@ -322,7 +331,7 @@ def test_every_call_answers_as_the_page_says(built, tmp_path: Path, fmi: str):
                     host.messages.clear()
                     assert made(host, call, 19, 3) == statuses[cell], (call, state)
                     assert bool(host.messages) == (cell != "OK") or state == "error"
-                    # A wrong call leads to the state error, in which nothing goes on.
+                    # A wrong call leads to the state error, in which no call is OK.
                     fails = cell == "error" or state == "error"
                     goes_on = host.call("fmi2Terminate") == Status.OK
                     assert goes_on != fails, (call, state)
@@ -362,7 +371,7 @@ def test_a_saved_state_continues_in_the_same_way(built, tmp_path: Path, fmi: str
             assert "for model exchange" in stepping.messages[-1].text
 
 
-def test_rates_that_cannot_be_computed_are_no_fault(built, tmp_path: Path):
+def test_rates_that_cannot_be_computed_raise_no_fault(built, tmp_path: Path):
     library = Library(Path(fmpy.extract(str(built("Remus100", "2")), tmp_path)))
     with reached(library, "in continuous-time mode") as host:
         x = (c_double * 18)(*[1e6] * 18)

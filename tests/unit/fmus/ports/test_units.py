@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 
 from fmus.ports.description import unit_definitions
-from fmus.ports.units import Unit, unit_of
+from fmus.ports.units import Unit, rate_of, unit_of
 
 
 @pytest.mark.parametrize(
@@ -59,3 +59,12 @@ def test_a_description_says_it():
         '<Unit name="furlong" /><Unit name="1"><BaseUnit factor="1" /></Unit>'
         '<Unit name="m/s"><BaseUnit m="1" s="-1" /></Unit></UnitDefinitions>'
     )
+
+
+@pytest.mark.parametrize(
+    ("unit", "rate"),
+    [("m", "m/s"), ("1", "1/s"), ("rad/s", "rad/s2"), ("kg.m2/s3", "kg.m2/s4"), ("K/W", ""),
+     ("degC", ""), ("", "")],
+)  # fmt: skip
+def test_units_of_rates(unit, rate):
+    assert rate_of(unit) == rate
