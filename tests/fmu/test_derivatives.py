@@ -194,6 +194,17 @@ def test_arrays_are_serialised(tmp_path: Path):
     np.testing.assert_array_equal(found, np.arange(9.0).reshape(3, 3) @ [1.0, 2.0, 3.0])
 
 
+def test_integers_and_booleans_have_the_derivative_0(native: Path, tmp_path: Path):
+    """OMSimulator asks for all that an output depends on."""
+    with instance(native / "AuvPlant.fmu", tmp_path) as it:
+        it.begin()
+        seed, fault = it.variables["noise.seed"], it.variables["fault"]
+        assert not it.jacobian([seed, it.variables["roll"]]).any()
+        known = it.having("input")[0].valueReference
+        give = it.fmu.getDirectionalDerivative
+        assert give([fault.valueReference], [known], [1.0]) == [0.0]
+
+
 def test_answers_in_all_modes(native: Path, tmp_path: Path):
     """A further get gives the same values."""
     with instance(native / "PdController.fmu", tmp_path) as it:

@@ -1,7 +1,8 @@
 /* Directional and adjoint derivatives of outputs, states and rates at one time, by inputs, parameters,
  * states and the time.
  *
- * In initialisation they go through the initial state; later the state is held.
+ * In initialisation they go through the initial state; later the state is held. Hosts ask for
+ * Integers and Booleans, too: their derivatives are 0.
  */
 #include <math.h>
 #include <string.h>
@@ -19,8 +20,7 @@ static int exchanged_place(uint32_t reference) {
 
 static int is_unknown(uint32_t reference) {
     const port *port = port_at(reference);
-    if (port == NULL) return exchanged_place(reference) >= 0;
-    return port->causality == OUTPUT && port->type == REAL;
+    return port == NULL ? exchanged_place(reference) >= 0 : port->causality == OUTPUT;
 }
 
 /* In initialisation, continuous states follow from the parameters. */
@@ -30,7 +30,7 @@ static int is_known(uint32_t reference, mode mode) {
     if (port == NULL) {
         return is_time(reference) || (mode != INITIALISING && place >= 0 && place < MODEL_RATES);
     }
-    return port->causality != OUTPUT && port->type == REAL;
+    return port->causality != OUTPUT;
 }
 
 /* Checks references, and brings outputs up to date. */
@@ -45,16 +45,15 @@ static int can_differentiate(call *this, const uint32_t unknowns[], size_t n_unk
     }
     for (size_t i = 0; i < n_unknowns && why.length == 0; i++) {
         if (!is_unknown(unknowns[i])) {
-            compose(&why, "the value reference %u is not of a %s output, or of a rate", unknowns[i],
-                    version.types[REAL]);
+            compose(&why, "the value reference %u is not of an output, or of a rate", unknowns[i]);
         }
     }
     for (size_t i = 0; i < n_knowns && why.length == 0; i++) {
         if (!is_known(knowns[i], it->run.mode)) {
             compose(&why,
-                    "the value reference %u is not of a %s input or parameter, or of a state that "
-                    "can be set",
-                    knowns[i], version.types[REAL]);
+                    "the value reference %u is not of an input, a parameter, or a state that can "
+                    "be set",
+                    knowns[i]);
         }
     }
     if (why.length == 0 && it->run.mode == INSTANTIATED) {
@@ -73,6 +72,8 @@ static void put_seed(directions *along, uint32_t reference, double seed) {
         along->time += seed;
     } else if (port == NULL) {
         along->state.values[continuous[exchanged_place(reference)]] += seed;
+    } else if (port->type != REAL) {
+        return;
     } else if (port->causality == INPUT) {
         along->inputs.values[port->place] += seed;
     } else {
@@ -84,7 +85,7 @@ static void put_seed(directions *along, uint32_t reference, double seed) {
 static double slope_of(const directions *along, uint32_t reference) {
     const port *port = port_at(reference);
     int place = exchanged_place(reference);
-    if (port != NULL) return along->outputs.values[port->place];
+    if (port != NULL) return port->type == REAL ? along->outputs.values[port->place] : 0.0;
     return place < MODEL_RATES ? along->state.values[continuous[place]]
                                : along->rates[place - MODEL_RATES];
 }
