@@ -49,6 +49,9 @@ _Known = dict[str, Value]
 #: Most numbers among which a symbol may choose by an index.
 _MOST_CHOICES = 1024
 
+#: Most turns of a `while` whose condition is a symbol; after them it must be a number.
+_MOST_TURNS = 100
+
 #: Operands that are harmless for each operation with infinite derivatives, by their places.
 _HARMLESS: Mapping[str, Mapping[int, float]] = {
     "x / y": {1: 1.0}, "int /": {1: 1.0}, "//": {1: 1.0}, "%": {1: 1.0}, "**": {0: 1.0},
@@ -318,11 +321,23 @@ class Evaluator:
         return self._loop(statement.body, known, next_turn)
 
     def _while(self, statement: tree.While, known: _Known) -> Condition:
+        loop, turns = self._frames[-1].loops, iter(range(_MOST_TURNS))
+
         def next_turn() -> bool:
             test = self._value(statement.test, known)
-            if isinstance(test, self._symbol):
-                raise self._cannot("the condition of a while")
-            return bool(test)
+            is_symbol = isinstance(test, self._symbol)
+            may_have_ended = len(self._path) > loop[-1].depth
+            if (is_symbol or (test and may_have_ended)) and next(turns, None) is None:
+                raise self._cannot("the end of a while")
+            if not is_symbol:
+                return bool(test)
+            # The loop ends here unless the condition holds.
+            depth = len(self._path)
+            self._enter(self._not(test))
+            loop[-1].breaks.append((self._since(loop[-1].depth), {**known}))
+            self._leave(depth)
+            self._enter(test)
+            return True
 
         return self._loop(statement.body, known, next_turn)
 
@@ -571,6 +586,10 @@ def _same(x: Value) -> Value:
 def _symbolic(ca: Any) -> Mapping[Operator, Callable[..., Value]]:
     """Return the operators of symbols; others take numbers only."""
 
+    def atan2(y: Value, x: Value) -> Value:
+        # The derivatives at the origin are infinite, but may be multiplied by zero.
+        return ca.atan2(y, x + ca.logic_and(x == 0.0, y == 0.0))
+
     def sqrt(x: Value) -> Value:
         # The derivative at zero is infinite, but may be multiplied by zero, as in a norm.
         is_zero = x == 0.0
@@ -597,7 +616,7 @@ def _symbolic(ca: Any) -> Mapping[Operator, Callable[..., Value]]:
         **{op: _PLAIN[op] for op in (
             tree.ADD, tree.SUBTRACT, tree.MULTIPLY, tree.OVER, tree.NEGATIVE, tree.DIVIDE,
             tree.POWER, tree.INT_ADD, tree.INT_SUBTRACT, tree.INT_MULTIPLY, tree.INT_NEGATIVE,
-            tree.INT_DIVIDE, tree.COUNT_ADD, tree.COUNT_MULTIPLY, tree.LESS, tree.LESS_EQUAL,
+            tree.INT_DIVIDE, tree.INT_POWER, tree.COUNT_ADD, tree.COUNT_MULTIPLY, tree.LESS, tree.LESS_EQUAL,
             tree.GREATER, tree.GREATER_EQUAL, tree.EQUAL, tree.NOT_EQUAL,
         )},
         tree.FLOOR_DIVIDE: floor_divide, tree.MODULO: modulo,
@@ -608,10 +627,11 @@ def _symbolic(ca: Any) -> Mapping[Operator, Callable[..., Value]]:
         tree.TO_FLOAT: _same, tree.TO_BOOL: lambda x: x != 0, tree.TO_INT: _same,
         tree.NEAREST: nearest, tree.AS_INT: _same, tree.NARROW: _same, tree.PLACE: place,
         **{tree.MATHEMATICS[name]: getattr(ca, name) for name in (
-            "acos", "acosh", "asin", "asinh", "atan", "atan2", "atanh", "ceil", "copysign", "cos",
+            "acos", "acosh", "asin", "asinh", "atan", "atanh", "ceil", "copysign", "cos",
             "cosh", "exp", "expm1", "fabs", "floor", "fmod", "log", "log10", "log1p", "sin",
             "sinh", "tan", "tanh",
         )},
+        tree.MATHEMATICS["atan2"]: atan2,
         tree.MATHEMATICS["isfinite"]: lambda x: ca.fabs(x) < math.inf,
         tree.MATHEMATICS["isinf"]: lambda x: ca.fabs(x) == math.inf,
         tree.MATHEMATICS["isnan"]: lambda x: ca.logic_not(ca.fabs(x) <= math.inf),
