@@ -616,8 +616,8 @@ def _symbolic(ca: Any) -> Mapping[Operator, Callable[..., Value]]:
         **{op: _PLAIN[op] for op in (
             tree.ADD, tree.SUBTRACT, tree.MULTIPLY, tree.OVER, tree.NEGATIVE, tree.DIVIDE,
             tree.POWER, tree.INT_ADD, tree.INT_SUBTRACT, tree.INT_MULTIPLY, tree.INT_NEGATIVE,
-            tree.INT_DIVIDE, tree.INT_POWER, tree.COUNT_ADD, tree.COUNT_MULTIPLY, tree.LESS, tree.LESS_EQUAL,
-            tree.GREATER, tree.GREATER_EQUAL, tree.EQUAL, tree.NOT_EQUAL,
+            tree.INT_DIVIDE, tree.INT_POWER, tree.COUNT_ADD, tree.COUNT_MULTIPLY, tree.LESS,
+            tree.LESS_EQUAL, tree.GREATER, tree.GREATER_EQUAL, tree.EQUAL, tree.NOT_EQUAL,
         )},
         tree.FLOOR_DIVIDE: floor_divide, tree.MODULO: modulo,
         tree.INT_FLOOR_DIVIDE: lambda a, b: ca.floor(a / b),

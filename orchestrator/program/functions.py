@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import repeat
 from pathlib import Path
@@ -18,6 +18,7 @@ from fmus.language.symbols import Evaluator, Value, filled, numbers_in
 from fmus.language.types import Array, Record, Type, type_of
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Misdeclared, Port
+from fmus.script import message_of, script_in
 from orchestrator.cosim import Connection, Linear, PortName, Stage, System, Visit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.lazy import casadi
@@ -34,15 +35,14 @@ _MOST_ROUNDS = 20
 _SAME = 1e-12
 
 
-#: What :func:`model` and the others take: the name of a component or a scenario, a path, or a
-#: system.
+#: A component or a system: a name, a path, the entries of a scenario file, or a loaded system.
 Source = str | Path | Mapping[str, Any] | System
 
 #: Names of parameters, or of groups of them, that are symbols; None: all Reals.
 Free = Collection[str] | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
     """A component as functions of CasADi.
 
@@ -68,7 +68,15 @@ class Model:
     outputs: list[str]
     default_inputs: list[float]
     default_parameters: list[float]
-    _equations: Any = field(repr=False)
+    _equations: Any
+
+    def __repr__(self) -> str:
+        """Return the name and the numbers of values."""
+        sizes = (
+            f"{len(getattr(self, name))} in {name}"
+            for name in ("state", "inputs", "parameters", "outputs")
+        )
+        return f"<Model of {self.name}: {', '.join(sizes)}>"
 
     @cached_property
     def advance(self) -> Any:
@@ -178,7 +186,10 @@ class _System:
 
     def __init__(self, prepared: Prepared, free: Free = None) -> None:
         if prepared.events or prepared.input_tables:
-            raise InputError("a function has no events and no tables of inputs: leave them out")
+            raise InputError(
+                "a function has no events and no tables of inputs: take the system from load, "
+                "which leaves them out"
+            )
         for refused in refusals(prepared.system):
             raise InputError(refused)
         self._plan = straight(prepared.plan)
@@ -282,7 +293,7 @@ class _System:
         if self._stages.passing is None:
             raise InputError(
                 f"observe: outputs in the order {self._plan.experiment.order} belong to different "
-                "times; take those of advance"
+                "times; take the outputs of advance"
             )
         moment, values = self._moment(iter(state), iter(inputs)), self._parameters(parameters)
         self._refresh(moment, values, t)
@@ -675,7 +686,7 @@ def _definition(source: str | Path) -> Definition | None:
         try:
             return definition_in(path)
         except Misdeclared as error:
-            raise InputError(f"{path}: {error}") from None
+            raise InputError(message_of(error, script_in(path))) from None
     known = [*components(), *scenario_names()]
     if name not in known and not is_path(name) and not path.exists():
         raise InputError(f"{name}: no such component or scenario{did_you_mean(name, known)}")

@@ -169,7 +169,7 @@ def is_smooth(port: Port, value: float) -> bool:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_derivatives_are_those_of_central_differences(name):
+def test_derivatives_agree_with_central_differences(name):
     step, made = some(name)[-1], model(name)
     definition = source(name).definition
     ports = {port.name: port for port in definition.ports}
@@ -232,7 +232,7 @@ SYSTEMS = (("fig4", None), ("fig5-pd", ["controller"]), ("remus", []))
 
 
 @pytest.mark.parametrize(("name", "free"), SYSTEMS)
-def test_system_has_the_rows_of_a_run(name, free):
+def test_system_gives_the_rows_of_simulate(name, free):
     values = {"plant.noise.std": 0.0}
     run = simulate(name, values, stop_time=1.0, kind="native")
     made = functions.model(name, values, free)
@@ -247,7 +247,7 @@ def test_system_has_the_rows_of_a_run(name, free):
 
 
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
-def test_system_of_another_order_has_the_rows_of_a_run(order):
+def test_another_order_gives_the_rows_of_simulate(order):
     values = {"plant.noise.std": 0.0}
     settings = {**tomllib.loads(FIG4.read_text()), "order": order, "stop_time": 1.0}
     run = simulate(settings, values, kind="native")
