@@ -30,7 +30,7 @@ FIRST = np.array([0.5] * 3 + [np.radians(5.0)] * 3 + [0.1] * 6 + [1.0] * 6)
 KEPT = np.exp(-STEP / 10.0)
 ADDED = np.diag(np.append(np.zeros(12), FIRST[12:] ** 2 * (1.0 - KEPT**2)))
 
-PLANT = model("AuvPlant")
+PLANT = model("AuvPlant", free=[])
 END, DY = PLANT.state.index("tau[1]"), PLANT.outputs.index("dy.x")
 
 
@@ -45,9 +45,9 @@ def functions():
     """Return functions of a state x, and of a command, errors or another state, by name."""
     x, tau, dx, other = (ca.SX.sym("x", n) for n in (END + 6, 3, 18, END + 6))
     full, inputs = ca.vertcat(x[:END], ca.SX.zeros(6)), ca.vertcat(tau, x[END:], ca.SX.zeros(6))
-    after, _ = PLANT.advance(full, inputs, PLANT.default_parameters, STEP, 0.0)
+    after, _ = PLANT.advance(full, inputs, [], STEP, 0.0)
     after = ca.vertcat(after[:END], KEPT * x[END:])
-    out = PLANT.observe(full, inputs, PLANT.default_parameters, 0.0)
+    out = PLANT.observe(full, inputs, [], 0.0)
     moved = x + tangent(x) @ dx
     moved[3:7] /= ca.norm_2(moved[3:7])
     apart = ca.vertcat(other[:3], other[3:7] / ca.dot(x[3:7], other[3:7]), other[7:]) - x

@@ -26,9 +26,8 @@ MOVES, HOLD, MOVE = 15, 10, 0.2
 #: share of the wrong velocity that corrects the disturbance.
 LIMIT, WEIGHT, CHANGE, SHARE = 80.0, 0.01, 0.075, 0.2
 
-PLANT = model("AuvPlant", {"integrator": "rk4"})
-ETA_0, Y = PLANT.parameters.index("eta0.x"), PLANT.outputs.index("y.x")
-NU, END = PLANT.state.index("nu_r[1]"), PLANT.state.index("tau[1]")
+PLANT = model("AuvPlant", {"integrator": "rk4"}, free=["eta0", "nu0"])
+NU, END, Y = PLANT.state.index("nu_r[1]"), PLANT.state.index("tau[1]"), PLANT.outputs.index("y.x")
 
 
 def functions():
@@ -41,9 +40,8 @@ def functions():
     full, inputs = ca.vertcat(state, ca.SX.zeros(6)), ca.vertcat(tau, tau_w, ca.SX.zeros(6))
     after, out = PLANT.advance(full, inputs, PLANT.default_parameters, MOVE, 0.0)
     move = ca.Function("move", [state, tau, tau_w], [after[:END], out[Y : Y + 3]])
-    motion, parameters = ca.SX.sym("motion", 12), ca.SX(PLANT.default_parameters)
-    parameters[ETA_0 : ETA_0 + 12] = motion
-    first = PLANT.start(PLANT.default_inputs, parameters, 0.0)[:END]
+    motion = ca.SX.sym("motion", 12)
+    first = PLANT.start(PLANT.default_inputs, motion, 0.0)[:END]
     begin, nu = ca.Function("begin", [motion], [first]), move(first, tau, tau_w)[0][NU:]
     drift = ca.Function("drift", [motion, tau, tau_w], [nu, ca.jacobian(nu, tau_w)])
 

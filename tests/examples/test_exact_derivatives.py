@@ -89,7 +89,7 @@ def test_no_other_plan_nearby_is_better_in_the_simulation():
 
 
 def test_predictive_controller_as_an_fmu_is_near_the_reference(workplace, monkeypatch):
-    """Of a run of Fig. 4, from the files and the commands of the page."""
+    """A run of Fig. 4, with the files and the commands of the page."""
     for path in (EXAMPLES / "derivatives").glob("*mpc*.py"):
         shutil.copy(path, workplace)
     monkeypatch.syspath_prepend(workplace)
