@@ -101,17 +101,26 @@ class Evaluator:
         #: Functions that are being evaluated.
         self._frames: list[_Frame] = []
 
-    def call(self, function: Function, *arguments: Value) -> Value:
+    def call(self, function: Function, *arguments: Value, unless: Condition = False) -> Value:
         """Return the result of a function.
+
+        Args:
+            function: the function.
+            arguments: its arguments, in order.
+            unless: condition under which nothing uses the result.
 
         Raises:
             NotSymbolic: it needs a number where there is a symbol, or it refuses its arguments.
 
         """
+        if unless is not False:
+            self._enter(self._not(unless))
         try:
             return self._call(function, arguments)
         except _Refused as error:
             raise NotSymbolic(str(error)) from None
+        finally:
+            self._leave(0)
 
     def joined(self, test: Condition, this: Value, other: Value) -> Value:
         """Return one of two values, chosen by a condition."""

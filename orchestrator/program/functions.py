@@ -15,7 +15,7 @@ from auv_fmu.paper import euler
 from fmus.discovery import components, source_of
 from fmus.language.build import Program, Untranslatable
 from fmus.language.symbols import Evaluator, Value, filled, numbers_in
-from fmus.language.types import Array, Record, Type, type_of
+from fmus.language.types import Array, Record, Type, count, type_of
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Misdeclared, Port
 from fmus.script import message_of, script_in
@@ -44,14 +44,14 @@ Free = Collection[str] | None
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model:
-    """A component as functions of CasADi.
+    """A component or a system as functions of CasADi.
 
-    The functions take and return column vectors; a Boolean is 0 or 1. A step is one internal step,
-    however long. There is no noise. Values are taken to be valid: what the component would refuse
-    gives numbers without a meaning.
+    The functions take and return column vectors; a Boolean is 0 or 1. A component's step is one
+    internal step, however long. There is no noise. Values are taken to be valid: what a component
+    would refuse gives numbers without a meaning.
 
     Attributes:
-        name: name of the component.
+        name: name of the component or the system.
         state: names of the numbers in the state.
         inputs: names of the inputs.
         parameters: names of the parameters that are arguments; the others are fixed.
@@ -96,6 +96,14 @@ class Model:
     def observe(self) -> Any:
         """Function of state, inputs, parameters, t: the outputs in a state at time t."""
         return self._function("observe", ("state", "inputs", "parameters", "t"))
+
+    @cached_property
+    def rates(self) -> Any:
+        """Function of state, inputs, parameters, t: the time derivative of the state.
+
+        It is zero for numbers that only steps change. A component has it if it has a hook `rates`.
+        """
+        return self._function("rates", ("state", "inputs", "parameters", "t"))
 
     def _function(self, name: str, arguments: Sequence[str]) -> Any:
         ca = casadi()
@@ -161,6 +169,11 @@ class _Component:
         """Return the outputs in a state."""
         now = filled(self._equations.types["state"], iter(state))
         return {"outputs": self._equations.outputs(self._given(inputs, parameters), now, t)}
+
+    def rates(self, state: Any, inputs: Any, parameters: Any, t: Any) -> dict[str, Any]:
+        """Return the time derivative of a state."""
+        now = filled(self._equations.types["state"], iter(state))
+        return {"rates": self._equations.rates(self._given(inputs, parameters), now, t)}
 
     def _given(self, inputs: Any, parameters: Any) -> dict[str, Value]:
         values = {**self._values, **dict(zip(self._free, parameters, strict=True))}
@@ -260,8 +273,7 @@ class _System:
         moment = self._moment(repeat(1.0), repeat(1.0))
         moment.values |= numbers
         for name, equations in self._equations.items():
-            count_ = len([*_names(equations.types["state"])])
-            symbols = ca.vertsplit(ca.SX.sym(name, count_))
+            symbols = ca.vertsplit(ca.SX.sym(name, count(equations.types["state"])))
             moment.states[name] = filled(equations.types["state"], iter(symbols))
         values = self._parameters([ca.SX.sym(str(port)) for port in self._free])
         self._step(moment, values, ca.SX.sym("h"), ca.SX.sym("t"))
@@ -299,6 +311,10 @@ class _System:
         self._refresh(moment, values, t)
         self._pass(moment, values, t)
         return {"outputs": self._shown(moment)}
+
+    def rates(self, state: Any, inputs: Any, parameters: Any, t: Any) -> dict[str, Any]:
+        """Refuse: components change at different times."""
+        raise InputError("rates: a system makes steps; take the rates of its components")
 
     def _parameters(self, free: Iterable[Value]) -> dict[PortName, Value]:
         return {**self._values, **dict(zip(self._free, free, strict=True))}
@@ -521,6 +537,23 @@ class Equations:
         known = {**given, "state": state, "t": t, "h": h}
         return self._call("update", self._derived("update", known))
 
+    def rates(self, given: Mapping[str, Value], state: Value, t: Value) -> Value:
+        """Return the time derivative of a state; zero for fields without one.
+
+        Raises:
+            InputError: there is no hook `rates`.
+
+        """
+        if "rates" not in self._functions:
+            raise InputError(f"{self._definition.name}: has no hook rates, only steps")
+        known = self._derived("rates", {**given, "state": state, "t": t})
+        returns, whole = self._functions["rates"].returns, self.types["state"]
+        assert isinstance(returns, Record) and isinstance(whole, Record)
+        found = dict(
+            zip([name for name, _ in returns.fields], self._call("rates", known), strict=True)
+        )
+        return tuple([found.get(name, (0.0,) * count(part)) for name, part in whole.fields])
+
     def outputs(self, given: Mapping[str, Value], state: Value, t: Value) -> Value:
         """Return the outputs in a state, without noise."""
         known = {**given, "state": self.restored(given, state), "t": t}
@@ -540,7 +573,9 @@ class Equations:
             return state
         known = {**given, "state": state}
         credible = self._call("credible", known)
-        return self.joined(credible, state, self._call("restarted", known))
+        if credible is True:
+            return state
+        return self.joined(credible, state, self._call("restarted", known, unless=credible))
 
     def joined(self, test: Any, this: Value, other: Value) -> Value:
         """Return one of two values, chosen by a condition."""
@@ -552,9 +587,10 @@ class Equations:
             return known
         return {**known, "derived": self._call("derive", known)}
 
-    def _call(self, hook: str, known: Mapping[str, Value]) -> Value:
+    def _call(self, hook: str, known: Mapping[str, Value], unless: Any = False) -> Value:
         function = self._functions[hook]
-        return self._evaluator.call(function, *(known[name] for name in function.arguments))
+        given = (known[name] for name in function.arguments)
+        return self._evaluator.call(function, *given, unless=unless)
 
 
 def settled(definition: Definition, given: Mapping[str, object]) -> dict[str, Any]:
