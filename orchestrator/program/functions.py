@@ -732,15 +732,7 @@ def _definition(source: str | Path) -> Definition | None:
 def function(
     source: Source, parameters: Mapping[str, object] | None = None, free: Free = None
 ) -> Any:
-    """Return the step of a component or a system as a function of CasADi: :attr:`Model.advance`.
-
-    Args:
-        source, parameters, free: as for :func:`model`.
-
-    Raises:
-        InputError: as :func:`model`.
-
-    """
+    """Return the step of a component or a system: `advance` of its :func:`model`."""
     return model(source, parameters, free).advance
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -223,6 +224,40 @@ def test_observe_gives_the_outputs_of_a_state():
     step = some("AuvPlant")[0]
     found = made.observe(step.next, step.inputs, step.parameters, step.t + step.h)
     np.testing.assert_allclose(found.full().ravel(), step.outputs, rtol=1e-12, atol=1e-13)
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_rates_are_what_the_hook_gives(name):
+    made, definition = model(name), source(name).definition
+    behaviour = definition.behaviour
+    hook = behaviour.hooks.get("rates")
+    if hook is None:
+        with pytest.raises(InputError, match="has no hook rates"):
+            made.rates  # noqa: B018
+        return
+    cls = slave_of(definition.name, import_module(source(name).module))
+    inputs = [port for port in definition.ports if port.causality == "input"]
+    known = {
+        "parameters": definition.parameters.of(
+            {port.name: port.start for port in definition.parameters.ports}
+        ),
+        "inputs": cls.unpack([port.start for port in reals_first(inputs)]),
+        "t": 0.0,
+    }
+    known["state"] = cls(instance_name="it").start(known["parameters"], known["inputs"], 0.0)
+    if derive := behaviour.hooks["derive"]:
+        taken = behaviour.arguments("derive")
+        known["derived"] = derive(*(known[argument] for argument in taken))
+    wanted = hook(*(known[argument] for argument in behaviour.arguments("rates")))
+    found = made.rates(_row(known["state"]), made.default_inputs, made.default_parameters, 0.0)
+    rates = dict(zip(made.state, found.full().ravel(), strict=True))
+    fields = {
+        field: [rate for path, rate in rates.items() if re.split(r"[.\[]", path)[0] == field]
+        for field in behaviour.state._fields
+    }
+    for field, values in fields.items():
+        same = _row(getattr(wanted, field)) if hasattr(wanted, field) else [0.0] * len(values)
+        np.testing.assert_allclose(values, same, rtol=1e-12, atol=1e-13)
 
 
 # Systems
