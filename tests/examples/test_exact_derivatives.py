@@ -93,7 +93,8 @@ def test_predictive_controller_as_an_fmu_is_near_the_reference(workplace, monkey
     for path in (EXAMPLES / "derivatives").glob("*mpc*.py"):
         shutil.copy(path, workplace)
     monkeypatch.syspath_prepend(workplace)
-    [code], [scenario] = blocks(PAGE, "python"), blocks(PAGE, "toml")
+    [code] = [block for block in blocks(PAGE, "python") if "nonlinear_mpc" in block.text]
+    [scenario] = [block for block in blocks(PAGE, "toml") if "MpcController" in block.text]
     exec(compile(code.text, str(PAGE), "exec"), {})
     Path("mpc.toml").write_text(scenario.text)
     assert main(["build", "mpc_controller.py"]) == 0
