@@ -325,10 +325,12 @@ class Evaluator:
 
         def next_turn() -> bool:
             test = self._value(statement.test, known)
-            if not isinstance(test, self._symbol):
-                return bool(test)
-            if next(turns, None) is None:
+            is_symbol = isinstance(test, self._symbol)
+            may_have_ended = len(self._path) > loop[-1].depth
+            if (is_symbol or (test and may_have_ended)) and next(turns, None) is None:
                 raise self._cannot("the end of a while")
+            if not is_symbol:
+                return bool(test)
             # The loop ends here unless the condition holds.
             depth = len(self._path)
             self._enter(self._not(test))
@@ -614,7 +616,7 @@ def _symbolic(ca: Any) -> Mapping[Operator, Callable[..., Value]]:
         **{op: _PLAIN[op] for op in (
             tree.ADD, tree.SUBTRACT, tree.MULTIPLY, tree.OVER, tree.NEGATIVE, tree.DIVIDE,
             tree.POWER, tree.INT_ADD, tree.INT_SUBTRACT, tree.INT_MULTIPLY, tree.INT_NEGATIVE,
-            tree.INT_DIVIDE, tree.COUNT_ADD, tree.COUNT_MULTIPLY, tree.LESS, tree.LESS_EQUAL,
+            tree.INT_DIVIDE, tree.INT_POWER, tree.COUNT_ADD, tree.COUNT_MULTIPLY, tree.LESS, tree.LESS_EQUAL,
             tree.GREATER, tree.GREATER_EQUAL, tree.EQUAL, tree.NOT_EQUAL,
         )},
         tree.FLOOR_DIVIDE: floor_divide, tree.MODULO: modulo,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import repeat
@@ -21,7 +21,7 @@ from fmus.ports.port import H_MAX, Misdeclared, Port
 from orchestrator.cosim import Connection, Linear, PortName, Stage, System, Visit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.lazy import casadi
-from orchestrator.program.components import definition_in, definitions_of
+from orchestrator.program.components import definition_in, definitions_of, refusals
 from orchestrator.program.writer import start_of, straight
 from orchestrator.runs.preparation import Prepared, is_path, prepare_options
 from orchestrator.runs.request import SystemOptions
@@ -32,6 +32,14 @@ _MOST_ROUNDS = 20
 
 #: Difference of values that have come to rest, absolute and relative.
 _SAME = 1e-12
+
+
+#: What :func:`model` and the others take: the name of a component or a scenario, a path, or a
+#: system.
+Source = str | Path | Mapping[str, Any] | System
+
+#: Names of parameters, or of groups of them, that are symbols; None: all Reals.
+Free = Collection[str] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,7 +54,7 @@ class Model:
         name: name of the component.
         state: names of the numbers in the state.
         inputs: names of the inputs.
-        parameters: names of the Real parameters; the others are fixed.
+        parameters: names of the parameters that are arguments; the others are fixed.
         outputs: names of the outputs.
         default_inputs: start values of the inputs.
         default_parameters: default values of the parameters.
@@ -108,15 +116,18 @@ def _column(ca: Any, numbers: Iterable[Value]) -> Any:
 class _Component:
     """One component as a model: its vectors, and its functions of them."""
 
-    def __init__(self, definition: Definition, given: Mapping[str, object]) -> None:
+    def __init__(
+        self, definition: Definition, given: Mapping[str, object], free: Free = None
+    ) -> None:
         self._equations = Equations(definition)
         ports = {
             causality: [port for port in definition.ports if port.causality == causality]
             for causality in ("input", "output", "parameter")
         }
-        values = settled(definition, given)
-        self._values = values
-        self._free = [port.name for port in definition.parameters.ports if port.type == "Real"]
+        values = self._values = settled(definition, given)
+        self._free = chosen(
+            [port.name for port in definition.parameters.ports if port.type == "Real"], free
+        )
         self.vectors: dict[str, list[Any]] = {
             "state": [*_names(self._equations.types["state"])],
             "inputs": [port.name for port in ports["input"]],
@@ -165,9 +176,11 @@ class _Moment:
 class _System:
     """A system as a model: one communication step of all components."""
 
-    def __init__(self, prepared: Prepared) -> None:
+    def __init__(self, prepared: Prepared, free: Free = None) -> None:
         if prepared.events or prepared.input_tables:
             raise InputError("a function has no events and no tables of inputs: leave them out")
+        for refused in refusals(prepared.system):
+            raise InputError(refused)
         self._plan = straight(prepared.plan)
         slow = [name for name, n in self._plan.decimations.items() if n > 1]
         if slow:
@@ -189,11 +202,12 @@ class _System:
             port: start_of(self._system, port, self._ports[port])
             for port in (*self._named("parameter"), *self._open)
         }
-        self._free = [
-            port
+        reals = {
+            str(port): port
             for port in self._named("parameter")
             if self._ports[port].type == "Real" and port.port != H_MAX
-        ]
+        }
+        self._free = [reals[name] for name in chosen([*reals], free)]
         self._turns = {name: self._internal_steps(name) for name in self._definitions}
         #: Inputs and outputs that a step takes from the step before.
         self._held = [port for port in (*inputs, *self._outputs) if port not in self._open]
@@ -555,12 +569,41 @@ def settled(definition: Definition, given: Mapping[str, object]) -> dict[str, An
             if value not in port.choices:
                 known = ", ".join(port.choices) or f"a number, it is of type {port.type}"
                 raise InputError(f"{name} = {value!r:.20}: use one of {known}")
-            value = port.choices[value]
+            value = int(port.choices[value])
         try:
             values[name] = _typed(port, port.checked(value))  # type: ignore[arg-type]
         except Refusal as error:
             raise InputError(str(error)) from None
+    if check := definition.behaviour.hooks["check"]:
+        try:
+            check(definition.parameters.of(values))
+        except (ArithmeticError, Refusal, ValueError) as error:
+            raise InputError(str(error)) from None
     return values
+
+
+def chosen(names: Sequence[str], free: Free) -> list[str]:
+    """Return the names of parameters that are symbols.
+
+    Args:
+        names: of all Real parameters.
+        free: names of some, or of groups such as `plant` and `plant.eta0`; None: all.
+
+    Raises:
+        InputError: there is no such Real parameter.
+
+    """
+    if free is None:
+        return [*names]
+    groups = {name: tuple(name + end for end in (".", "[")) for name in free}
+    for group, starts in groups.items():
+        if not any(name == group or name.startswith(starts) for name in names):
+            raise InputError(f"{group}: no such Real parameter{did_you_mean(group, names)}")
+    return [
+        name
+        for name in names
+        if any(name == group or name.startswith(starts) for group, starts in groups.items())
+    ]
 
 
 def _typed(port: Port, value: Any) -> Any:
@@ -589,12 +632,9 @@ def _names(type_: Type, name: str = "") -> Iterator[str]:
         yield name
 
 
-#: What :func:`model` and the others take: the name of a component or a scenario, a path, or a
-#: system.
-Source = str | Path | Mapping[str, Any] | System
-
-
-def model(source: Source, parameters: Mapping[str, object] | None = None) -> Model:
+def model(
+    source: Source, parameters: Mapping[str, object] | None = None, free: Free = None
+) -> Model:
     """Return a component or a system as functions of CasADi.
 
     Args:
@@ -603,6 +643,9 @@ def model(source: Source, parameters: Mapping[str, object] | None = None) -> Mod
             scenario file, or a system from `load`.
         parameters: values of parameters by name, in a system by `component.parameter`. A Real's
             value replaces its default; other parameters are fixed, since they may choose equations.
+        free: names of the Real parameters that the functions take, or of groups such as `plant`
+            and `plant.eta0`; the others are fixed, too, which makes the functions smaller. None:
+            all.
 
     Raises:
         InputError: there is no such component, system or parameter, casadi is missing, or the
@@ -614,10 +657,10 @@ def model(source: Source, parameters: Mapping[str, object] | None = None) -> Mod
     if definition is None:
         options = SystemOptions(source, parameters)
         prepared = prepare_options(options, is_open=True)
-        system = _System(prepared)
+        system = _System(prepared, free)
         return Model(prepared.scenario.name, _equations=system, **system.vectors)
     try:
-        made = _Component(definition, parameters or {})
+        made = _Component(definition, parameters or {}, free)
     except Untranslatable as error:
         raise InputError(f"{source}: is not in the language of equations: {error}") from None
     return Model(definition.name, _equations=made, **made.vectors)
@@ -639,23 +682,27 @@ def _definition(source: str | Path) -> Definition | None:
     return None
 
 
-def function(source: Source, parameters: Mapping[str, object] | None = None) -> Any:
+def function(
+    source: Source, parameters: Mapping[str, object] | None = None, free: Free = None
+) -> Any:
     """Return the step of a component or a system as a function of CasADi: :attr:`Model.advance`.
 
     Args:
-        source, parameters: as for :func:`model`.
+        source, parameters, free: as for :func:`model`.
 
     Raises:
         InputError: as :func:`model`.
 
     """
-    return model(source, parameters).advance
+    return model(source, parameters, free).advance
 
 
-def refusal(source: Source, parameters: Mapping[str, object] | None = None) -> str:
+def refusal(
+    source: Source, parameters: Mapping[str, object] | None = None, free: Free = None
+) -> str:
     """Return the reason why something cannot be a function of CasADi; empty if it can."""
     try:
-        function(source, parameters)
+        function(source, parameters, free)
     except InputError as error:
         return str(error)
     return ""
