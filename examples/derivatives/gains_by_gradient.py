@@ -2,9 +2,9 @@
 
     python examples/derivatives/gains_by_gradient.py [STARTS]
 
-Scenario, ranges and aim are those of `python tools/page_numbers.py gains`: the largest error of the
-second half of a run is to be small, and no command beyond a limit. Searches start from the paper's
-gains; STARTS more, from random ones.
+Scenario, ranges and aim as in `python tools/page_numbers.py gains`: the least largest error of the
+second half of a run whose commands stay within a limit. Searches start from the paper's gains, and
+STARTS more from random gains.
 """
 
 import sys
@@ -16,16 +16,14 @@ from scipy.optimize import linprog
 
 from auv_fmu.casadi import model
 
-LOOP = model("fig5", {"planner.eta0.z": -2.0})
-
 #: Gains and their ranges, and the outputs that count.
 RANGES = {
     "lambda": (0.2, 5.0), "k_d": (5.0, 50.0), "gamma": (0.1, 10.0), "sigma": (1e-4, 0.1),
     "eps_t": (0.1, 100.0), **{f"K{n}[{axis}]": (1.0, 100.0) for n in (1, 2) for axis in (1, 2, 3)},
 }  # fmt: skip
-LOW, HIGH = np.log([*RANGES.values()]).T
-PLACES = [LOOP.parameters.index(f"controller.{name}") for name in RANGES]
-PAPER = np.log(np.array(LOOP.default_parameters)[PLACES])
+LOOP = model("fig5", {"planner.eta0.z": -2.0}, [f"controller.{name}" for name in RANGES])
+LOW, HIGH = np.log([RANGES[name.partition(".")[2]] for name in LOOP.parameters]).T
+PAPER = np.log(LOOP.default_parameters)
 SHOWN = [f"controller.{name}" for name in ("e.x", "e.y", "e.z", "tau.u", "tau.q", "tau.r")]
 
 #: The step [s], the number of steps, and the number of errors that count.
@@ -39,16 +37,15 @@ LIMITS, PRICE = (10.0, 20.0, 80.0), 0.1
 def run_of():
     """Return late errors and all commands as a function of ln(gains), and its derivatives."""
     state, t = ca.SX.sym("state", len(LOOP.state)), ca.SX.sym("t")
-    gains, parameters = ca.SX.sym("gains", len(RANGES)), ca.SX(LOOP.default_parameters)
-    parameters[PLACES] = ca.exp(gains)
-    inputs, shown = LOOP.default_inputs, [LOOP.outputs.index(name) for name in SHOWN]
-    begin = LOOP.start(inputs, parameters, 0.0)
-    first = LOOP.observe(begin, inputs, parameters, 0.0)
-    after, outputs = LOOP.advance(state, inputs, parameters, H, t)
+    gains, inputs = ca.SX.sym("gains", len(PAPER)), LOOP.default_inputs
+    shown = [LOOP.outputs.index(name) for name in SHOWN]
+    begin = LOOP.start(inputs, ca.exp(gains), 0.0)
+    first = LOOP.observe(begin, inputs, ca.exp(gains), 0.0)
+    after, outputs = LOOP.advance(state, inputs, ca.exp(gains), H, t)
     fast = {"cse": True, "der_options": {"cse": True}}
     start = ca.Function("start", [gains], [begin, first[shown]], fast)
     step = ca.Function("step", [state, gains, t], [after, outputs[shown]], fast)
-    gains, times = ca.MX.sym("gains", len(RANGES)), H * np.arange(STEPS)
+    gains, times = ca.MX.sym("gains", len(PAPER)), H * np.arange(STEPS)
     begin, first = start(gains)
     _, rows = step.mapaccum(STEPS)(begin, ca.repmat(gains, 1, STEPS), times[None])
     rows = ca.horzcat(first, rows)
@@ -112,7 +109,7 @@ if __name__ == "__main__":
     random = np.random.default_rng(1)
     for k in range(int(sys.argv[1]) if len(sys.argv) > 1 else 0):
         tries[f"random {k + 1}"] = exact, random.uniform(LOW, HIGH)
-    print("limit  derivatives  late error  command   runs  derivatives   time")
+    print("limit  search      late error   command   runs  derivatives    time")
     for limit in LIMITS:
         found = []
         for name, (slopes, start) in tries.items():
@@ -120,7 +117,8 @@ if __name__ == "__main__":
             gains, values, counts = search(run, slopes, start, limit)
             found.append((cost(values, limit), gains))
             errors, commands = 100.0 * values[:LATE], values[LATE:]
-            row = f"{limit:5.0f}  {name:11} {errors.max():8.1f} cm {commands.max():8.1f}"
-            print(row, "{:6} {:12}".format(*counts), f"{process_time() - begun:5.0f} s", flush=True)
+            row = f"{limit:5.0f}  {name:11} {errors.max():7.2f} cm {commands.max():9.2f}"
+            print(row, "{:5} {:12}".format(*counts), f"{process_time() - begun:5.0f} s", flush=True)
         best = np.exp(min(found, key=lambda pair: pair[0])[1])
-        print("      ", ", ".join(f"{name} {gain:.6g}" for name, gain in zip(RANGES, best)))
+        names = (name.partition(".")[2] for name in LOOP.parameters)
+        print("      ", ", ".join(f"{name} {gain:.6g}" for name, gain in zip(names, best)))

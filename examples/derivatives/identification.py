@@ -15,11 +15,10 @@ from scipy.optimize import least_squares
 from auv_fmu import Simulation
 from auv_fmu.casadi import model
 
-PLANT = model("AuvPlant", {"integrator": 1})
-
 #: The parameters: masses, damping and righting moments. The first guess is 30 % too low.
-NAMES = PLANT.parameters[: PLANT.parameters.index("ell")]
-TRUTH = np.array(PLANT.default_parameters[: len(NAMES)])
+FREE = [f"{kind}{k}{k}" for kind in "md" for k in range(1, 7)] + ["righting"]
+PLANT = model("AuvPlant", {"integrator": "rk4"}, FREE)
+NAMES, TRUTH = PLANT.parameters, np.array(PLANT.default_parameters)
 GUESS = 0.7 * TRUTH
 
 #: The run: the step [s] and the number of steps, standard deviations of the noise [m, rad], and the
@@ -47,10 +46,8 @@ def record(tau, parameters=None, only=("plant",)):
 def run_of(tau):
     """Return the same as a function of the parameters, and its derivatives."""
     state, command = ca.SX.sym("state", len(PLANT.state)), ca.SX.sym("tau", 3)
-    theta, parameters = ca.SX.sym("theta", len(NAMES)), ca.SX(PLANT.default_parameters)
-    parameters[: len(NAMES)] = theta
-    inputs = ca.vertcat(command, *PLANT.default_inputs[3:])
-    after = PLANT.advance(state, inputs, parameters, H, 0.0)
+    inputs, theta = ca.vertcat(command, *PLANT.default_inputs[3:]), ca.SX.sym("theta", len(NAMES))
+    after = PLANT.advance(state, inputs, theta, H, 0.0)
     fast = {"cse": True, "der_options": {"cse": True}}
     step = ca.Function("step", [state, command, theta], after, fast)
     theta = ca.MX.sym("theta", len(NAMES))
