@@ -101,17 +101,26 @@ class Evaluator:
         #: Functions that are being evaluated.
         self._frames: list[_Frame] = []
 
-    def call(self, function: Function, *arguments: Value) -> Value:
+    def call(self, function: Function, *arguments: Value, unless: Condition = False) -> Value:
         """Return the result of a function.
+
+        Args:
+            function: the function.
+            arguments: its arguments, in order.
+            unless: condition under which nothing uses the result.
 
         Raises:
             NotSymbolic: it needs a number where there is a symbol, or it refuses its arguments.
 
         """
+        if unless is not False:
+            self._enter(self._not(unless))
         try:
             return self._call(function, arguments)
         except _Refused as error:
             raise NotSymbolic(str(error)) from None
+        finally:
+            self._leave(0)
 
     def joined(self, test: Condition, this: Value, other: Value) -> Value:
         """Return one of two values, chosen by a condition."""
@@ -616,8 +625,8 @@ def _symbolic(ca: Any) -> Mapping[Operator, Callable[..., Value]]:
         **{op: _PLAIN[op] for op in (
             tree.ADD, tree.SUBTRACT, tree.MULTIPLY, tree.OVER, tree.NEGATIVE, tree.DIVIDE,
             tree.POWER, tree.INT_ADD, tree.INT_SUBTRACT, tree.INT_MULTIPLY, tree.INT_NEGATIVE,
-            tree.INT_DIVIDE, tree.INT_POWER, tree.COUNT_ADD, tree.COUNT_MULTIPLY, tree.LESS, tree.LESS_EQUAL,
-            tree.GREATER, tree.GREATER_EQUAL, tree.EQUAL, tree.NOT_EQUAL,
+            tree.INT_DIVIDE, tree.INT_POWER, tree.COUNT_ADD, tree.COUNT_MULTIPLY, tree.LESS,
+            tree.LESS_EQUAL, tree.GREATER, tree.GREATER_EQUAL, tree.EQUAL, tree.NOT_EQUAL,
         )},
         tree.FLOOR_DIVIDE: floor_divide, tree.MODULO: modulo,
         tree.INT_FLOOR_DIVIDE: lambda a, b: ca.floor(a / b),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import repeat
 from pathlib import Path
@@ -15,9 +15,10 @@ from auv_fmu.paper import euler
 from fmus.discovery import components, source_of
 from fmus.language.build import Program, Untranslatable
 from fmus.language.symbols import Evaluator, Value, filled, numbers_in
-from fmus.language.types import Array, Record, Type, type_of
+from fmus.language.types import Array, Record, Type, count, type_of
 from fmus.ports.definition import Definition
 from fmus.ports.port import H_MAX, Misdeclared, Port
+from fmus.script import message_of, script_in
 from orchestrator.cosim import Connection, Linear, PortName, Stage, System, Visit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.lazy import casadi
@@ -34,24 +35,23 @@ _MOST_ROUNDS = 20
 _SAME = 1e-12
 
 
-#: What :func:`model` and the others take: the name of a component or a scenario, a path, or a
-#: system.
+#: A component or a system: a name, a path, the entries of a scenario file, or a loaded system.
 Source = str | Path | Mapping[str, Any] | System
 
 #: Names of parameters, or of groups of them, that are symbols; None: all Reals.
 Free = Collection[str] | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Model:
-    """A component as functions of CasADi.
+    """A component or a system as functions of CasADi.
 
-    The functions take and return column vectors; a Boolean is 0 or 1. A step is one internal step,
-    however long. There is no noise. Values are taken to be valid: what the component would refuse
-    gives numbers without a meaning.
+    The functions take and return column vectors; a Boolean is 0 or 1. A component's step is one
+    internal step, however long. There is no noise. Values are taken to be valid: what a component
+    would refuse gives numbers without a meaning.
 
     Attributes:
-        name: name of the component.
+        name: name of the component or the system.
         state: names of the numbers in the state.
         inputs: names of the inputs.
         parameters: names of the parameters that are arguments; the others are fixed.
@@ -68,7 +68,15 @@ class Model:
     outputs: list[str]
     default_inputs: list[float]
     default_parameters: list[float]
-    _equations: Any = field(repr=False)
+    _equations: Any
+
+    def __repr__(self) -> str:
+        """Return the name and the numbers of values."""
+        sizes = (
+            f"{len(getattr(self, name))} in {name}"
+            for name in ("state", "inputs", "parameters", "outputs")
+        )
+        return f"<Model of {self.name}: {', '.join(sizes)}>"
 
     @cached_property
     def advance(self) -> Any:
@@ -88,6 +96,14 @@ class Model:
     def observe(self) -> Any:
         """Function of state, inputs, parameters, t: the outputs in a state at time t."""
         return self._function("observe", ("state", "inputs", "parameters", "t"))
+
+    @cached_property
+    def rates(self) -> Any:
+        """Function of state, inputs, parameters, t: the time derivative of the state.
+
+        It is zero for numbers that only steps change. A component has it if it has a hook `rates`.
+        """
+        return self._function("rates", ("state", "inputs", "parameters", "t"))
 
     def _function(self, name: str, arguments: Sequence[str]) -> Any:
         ca = casadi()
@@ -154,6 +170,11 @@ class _Component:
         now = filled(self._equations.types["state"], iter(state))
         return {"outputs": self._equations.outputs(self._given(inputs, parameters), now, t)}
 
+    def rates(self, state: Any, inputs: Any, parameters: Any, t: Any) -> dict[str, Any]:
+        """Return the time derivative of a state."""
+        now = filled(self._equations.types["state"], iter(state))
+        return {"rates": self._equations.rates(self._given(inputs, parameters), now, t)}
+
     def _given(self, inputs: Any, parameters: Any) -> dict[str, Value]:
         values = {**self._values, **dict(zip(self._free, parameters, strict=True))}
         return self._equations.given(values, inputs)
@@ -178,7 +199,10 @@ class _System:
 
     def __init__(self, prepared: Prepared, free: Free = None) -> None:
         if prepared.events or prepared.input_tables:
-            raise InputError("a function has no events and no tables of inputs: leave them out")
+            raise InputError(
+                "a function has no events and no tables of inputs: take the system from load, "
+                "which leaves them out"
+            )
         for refused in refusals(prepared.system):
             raise InputError(refused)
         self._plan = straight(prepared.plan)
@@ -249,8 +273,7 @@ class _System:
         moment = self._moment(repeat(1.0), repeat(1.0))
         moment.values |= numbers
         for name, equations in self._equations.items():
-            count_ = len([*_names(equations.types["state"])])
-            symbols = ca.vertsplit(ca.SX.sym(name, count_))
+            symbols = ca.vertsplit(ca.SX.sym(name, count(equations.types["state"])))
             moment.states[name] = filled(equations.types["state"], iter(symbols))
         values = self._parameters([ca.SX.sym(str(port)) for port in self._free])
         self._step(moment, values, ca.SX.sym("h"), ca.SX.sym("t"))
@@ -282,12 +305,16 @@ class _System:
         if self._stages.passing is None:
             raise InputError(
                 f"observe: outputs in the order {self._plan.experiment.order} belong to different "
-                "times; take those of advance"
+                "times; take the outputs of advance"
             )
         moment, values = self._moment(iter(state), iter(inputs)), self._parameters(parameters)
         self._refresh(moment, values, t)
         self._pass(moment, values, t)
         return {"outputs": self._shown(moment)}
+
+    def rates(self, state: Any, inputs: Any, parameters: Any, t: Any) -> dict[str, Any]:
+        """Refuse: components change at different times."""
+        raise InputError("rates: a system makes steps; take the rates of its components")
 
     def _parameters(self, free: Iterable[Value]) -> dict[PortName, Value]:
         return {**self._values, **dict(zip(self._free, free, strict=True))}
@@ -510,6 +537,23 @@ class Equations:
         known = {**given, "state": state, "t": t, "h": h}
         return self._call("update", self._derived("update", known))
 
+    def rates(self, given: Mapping[str, Value], state: Value, t: Value) -> Value:
+        """Return the time derivative of a state; zero for fields without one.
+
+        Raises:
+            InputError: there is no hook `rates`.
+
+        """
+        if "rates" not in self._functions:
+            raise InputError(f"{self._definition.name}: has no hook rates, only steps")
+        known = self._derived("rates", {**given, "state": state, "t": t})
+        returns, whole = self._functions["rates"].returns, self.types["state"]
+        assert isinstance(returns, Record) and isinstance(whole, Record)
+        found = dict(
+            zip([name for name, _ in returns.fields], self._call("rates", known), strict=True)
+        )
+        return tuple([found.get(name, (0.0,) * count(part)) for name, part in whole.fields])
+
     def outputs(self, given: Mapping[str, Value], state: Value, t: Value) -> Value:
         """Return the outputs in a state, without noise."""
         known = {**given, "state": self.restored(given, state), "t": t}
@@ -529,7 +573,9 @@ class Equations:
             return state
         known = {**given, "state": state}
         credible = self._call("credible", known)
-        return self.joined(credible, state, self._call("restarted", known))
+        if credible is True:
+            return state
+        return self.joined(credible, state, self._call("restarted", known, unless=credible))
 
     def joined(self, test: Any, this: Value, other: Value) -> Value:
         """Return one of two values, chosen by a condition."""
@@ -541,9 +587,10 @@ class Equations:
             return known
         return {**known, "derived": self._call("derive", known)}
 
-    def _call(self, hook: str, known: Mapping[str, Value]) -> Value:
+    def _call(self, hook: str, known: Mapping[str, Value], unless: Any = False) -> Value:
         function = self._functions[hook]
-        return self._evaluator.call(function, *(known[name] for name in function.arguments))
+        given = (known[name] for name in function.arguments)
+        return self._evaluator.call(function, *given, unless=unless)
 
 
 def settled(definition: Definition, given: Mapping[str, object]) -> dict[str, Any]:
@@ -675,7 +722,7 @@ def _definition(source: str | Path) -> Definition | None:
         try:
             return definition_in(path)
         except Misdeclared as error:
-            raise InputError(f"{path}: {error}") from None
+            raise InputError(message_of(error, script_in(path))) from None
     known = [*components(), *scenario_names()]
     if name not in known and not is_path(name) and not path.exists():
         raise InputError(f"{name}: no such component or scenario{did_you_mean(name, known)}")
@@ -685,15 +732,7 @@ def _definition(source: str | Path) -> Definition | None:
 def function(
     source: Source, parameters: Mapping[str, object] | None = None, free: Free = None
 ) -> Any:
-    """Return the step of a component or a system as a function of CasADi: :attr:`Model.advance`.
-
-    Args:
-        source, parameters, free: as for :func:`model`.
-
-    Raises:
-        InputError: as :func:`model`.
-
-    """
+    """Return the step of a component or a system: `advance` of its :func:`model`."""
     return model(source, parameters, free).advance
 
 

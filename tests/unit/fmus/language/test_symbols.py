@@ -104,7 +104,7 @@ def function_of(equation):
 
 
 @pytest.mark.parametrize(("equation", "points", "smooth"), CASES, ids=lambda case: str(case)[:20])
-def test_values_and_derivatives_are_those_of_the_program(equation, points, smooth):
+def test_values_and_derivatives_agree_with_the_program(equation, points, smooth):
     function = function_of(equation)
     for x in points:
         value, *derivatives = map(float, function(x))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 import tomllib
 from collections.abc import Iterator
@@ -169,7 +170,7 @@ def is_smooth(port: Port, value: float) -> bool:
 
 
 @pytest.mark.parametrize("name", ALL)
-def test_derivatives_are_those_of_central_differences(name):
+def test_derivatives_agree_with_central_differences(name):
     step, made = some(name)[-1], model(name)
     definition = source(name).definition
     ports = {port.name: port for port in definition.ports}
@@ -225,6 +226,40 @@ def test_observe_gives_the_outputs_of_a_state():
     np.testing.assert_allclose(found.full().ravel(), step.outputs, rtol=1e-12, atol=1e-13)
 
 
+@pytest.mark.parametrize("name", ALL)
+def test_rates_are_what_the_hook_gives(name):
+    made, definition = model(name), source(name).definition
+    behaviour = definition.behaviour
+    hook = behaviour.hooks.get("rates")
+    if hook is None:
+        with pytest.raises(InputError, match="has no hook rates"):
+            made.rates  # noqa: B018
+        return
+    cls = slave_of(definition.name, import_module(source(name).module))
+    inputs = [port for port in definition.ports if port.causality == "input"]
+    known = {
+        "parameters": definition.parameters.of(
+            {port.name: port.start for port in definition.parameters.ports}
+        ),
+        "inputs": cls.unpack([port.start for port in reals_first(inputs)]),
+        "t": 0.0,
+    }
+    known["state"] = cls(instance_name="it").start(known["parameters"], known["inputs"], 0.0)
+    if derive := behaviour.hooks["derive"]:
+        taken = behaviour.arguments("derive")
+        known["derived"] = derive(*(known[argument] for argument in taken))
+    wanted = hook(*(known[argument] for argument in behaviour.arguments("rates")))
+    found = made.rates(_row(known["state"]), made.default_inputs, made.default_parameters, 0.0)
+    rates = dict(zip(made.state, found.full().ravel(), strict=True))
+    fields = {
+        field: [rate for path, rate in rates.items() if re.split(r"[.\[]", path)[0] == field]
+        for field in behaviour.state._fields
+    }
+    for field, values in fields.items():
+        same = _row(getattr(wanted, field)) if hasattr(wanted, field) else [0.0] * len(values)
+        np.testing.assert_allclose(values, same, rtol=1e-12, atol=1e-13)
+
+
 # Systems
 
 #: Scenarios, and parameters that are free, if not all.
@@ -232,7 +267,7 @@ SYSTEMS = (("fig4", None), ("fig5-pd", ["controller"]), ("remus", []))
 
 
 @pytest.mark.parametrize(("name", "free"), SYSTEMS)
-def test_system_has_the_rows_of_a_run(name, free):
+def test_system_gives_the_rows_of_simulate(name, free):
     values = {"plant.noise.std": 0.0}
     run = simulate(name, values, stop_time=1.0, kind="native")
     made = functions.model(name, values, free)
@@ -247,7 +282,7 @@ def test_system_has_the_rows_of_a_run(name, free):
 
 
 @pytest.mark.parametrize("order", ["gauss-seidel", "jacobi"])
-def test_system_of_another_order_has_the_rows_of_a_run(order):
+def test_another_order_gives_the_rows_of_simulate(order):
     values = {"plant.noise.std": 0.0}
     settings = {**tomllib.loads(FIG4.read_text()), "order": order, "stop_time": 1.0}
     run = simulate(settings, values, kind="native")
