@@ -195,7 +195,7 @@ def test_arrays_are_serialised(tmp_path: Path):
 
 
 def test_integers_and_booleans_have_the_derivative_0(native: Path, tmp_path: Path):
-    """OMSimulator asks for all that an output depends on."""
+    """OMSimulator asks for everything that an output depends on."""
     with instance(native / "AuvPlant.fmu", tmp_path) as it:
         it.begin()
         seed, fault = it.variables["noise.seed"], it.variables["fault"]
