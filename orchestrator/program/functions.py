@@ -709,7 +709,7 @@ def model(
     try:
         made = _Component(definition, parameters or {}, free)
     except Untranslatable as error:
-        raise InputError(f"{source}: is not in the language of equations: {error}") from None
+        raise InputError(str(error)) from None
     return Model(definition.name, _equations=made, **made.vectors)
 
 
