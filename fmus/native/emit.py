@@ -6,7 +6,7 @@ import inspect
 import re
 import textwrap
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from functools import cache
 from itertools import groupby
 from math import inf, isinf, isnan
@@ -49,7 +49,7 @@ INDENT = "    "
 _WIDE = "long long"
 
 #: Precedence of the operators of C.
-_TERNARY, _OR, _AND, _EQUALITY, _RELATION, _SUM, _PRODUCT, _UNARY, _POSTFIX = range(9)
+TERNARY, _OR, _AND, _EQUALITY, _RELATION, _SUM, _PRODUCT, _UNARY, POSTFIX = range(9)
 
 #: Operators of C between two operands.
 _INFIX: dict[Operator, tuple[str, int]] = {
@@ -127,7 +127,7 @@ def _list(items: Iterable[str]) -> str:
     return f",{_BREAK}".join(item.replace(_BREAK, " ") for item in items)
 
 
-def _call(name: str, arguments: Iterable[str], fails: bool) -> str:
+def call(name: str, arguments: Iterable[str], fails: bool) -> str:
     """Return a call; if it may fail, it gets `error` as its last argument."""
     return f"{name}({_list([*arguments, *(['error'] if fails else [])])})"
 
@@ -175,15 +175,25 @@ class Emitter:
     Attributes:
         structures, constants: their definitions, by name.
         names: names of the functions.
+        taken: names of structures, functions and constants.
 
     """
 
-    def __init__(self, functions: Iterable[Function], most_copied: float = inf) -> None:
+    #: Type of a float, and whether comments are kept.
+    real, explains = "double", True
+
+    def __init__(
+        self,
+        functions: Iterable[Function],
+        most_copied: float = inf,
+        taken: Collection[str] = (),
+    ) -> None:
         """Choose names of the functions, and define the structures that they pass.
 
         Args:
             functions: functions, each after those that it calls.
             most_copied: largest structure, in numbers, that is passed by value, not by address.
+            taken: names that something else in the file has.
 
         """
         functions = [*functions]
@@ -200,7 +210,7 @@ class Emitter:
         #: Names of variables, which nothing else may have.
         self._variables = {in_c(name) for function in functions for name in _variables(function)}
         #: Names of structures, functions and constants, and of functions of `math` that raise.
-        self._taken = {f"math_{name}" for name in FUNCTIONS}
+        self.taken = {f"math_{name}" for name in FUNCTIONS} | {*taken}
         for function in functions:
             for type_ in (*function.arguments.values(), function.returns):
                 self.type(type_)
@@ -211,9 +221,12 @@ class Emitter:
 
     def text(self) -> str:
         """Return all definitions."""
-        functions = [_Definition(self, function).text() for function in self.names]
+        functions = [self._defined(function) for function in self.names]
         parts = [*self.structures.values(), *self.constants.values(), *self._wrappers.values()]
         return "\n\n".join([*parts, *functions])
+
+    def _defined(self, function: Function) -> str:
+        return Definition(self, function).text()
 
     def call(self, function: Function, arguments: Sequence[str]) -> str:
         """Return a call in a function that has an argument `error` if it is needed."""
@@ -222,7 +235,7 @@ class Emitter:
             f"&{text}" if name in addressed else text
             for name, text in zip(function.arguments, arguments)
         ]
-        return _call(self.names[function], given, function.fails)
+        return call(self.names[function], given, function.fails)
 
     def addressed(self, function: Function) -> frozenset[str]:
         """Return the arguments of a function that are passed by address."""
@@ -237,9 +250,9 @@ class Emitter:
     def unused(self, name: str) -> str:
         """Return a name that no other structure, function or constant has."""
         name += "_" if is_of_library(name) else ""
-        while name in self._taken or name in self._variables or name in words_of_runtime():
+        while name in self.taken or name in self._variables or name in words_of_runtime():
             name += "_"
-        self._taken.add(name)
+        self.taken.add(name)
         return name
 
     def _in_module(self, module: str, name: str, *sizes: Type) -> str:
@@ -256,12 +269,16 @@ class Emitter:
         if isinstance(type_, Scalar):
             if is_whole(type_):
                 return "int"
-            return {FLOAT: "double", TEXT: "const char *"}.get(type_, "void")
+            return {FLOAT: self.real, TEXT: "const char *"}.get(type_, "void")
         # Arrays with the same type in C share one structure.
         key = (self.type(type_.item), type_.n) if isinstance(type_, Array) else type_
         if key not in self._types:
             self._types[key] = self._structure(type_)
         return self._types[key]
+
+    def is_number(self, type_: Type) -> bool:
+        """Return True for a number of C."""
+        return isinstance(type_, Scalar)
 
     def declared(self, type_: Type) -> str:
         """Return a type for a declaration, with a space if one is needed before the name."""
@@ -281,7 +298,7 @@ class Emitter:
             else:
                 name = f"{item}x{n}"
         else:
-            about = _comments(type_.made)
+            about = _comments(type_.made) if self.explains else {}
             rows = [
                 f"    {self.type(part)} {in_c(name)};{about.get(name, '')}"
                 for name, part in type_.fields
@@ -291,7 +308,7 @@ class Emitter:
                 name = class_in_c(type_.made.__name__)
                 doc = inspect.cleandoc(type_.made.__doc__ or "").partition("\n")[0]
         name = self.unused(name)
-        head = [f"/* {strip_sphinx_marks(doc)} */"] if doc else []
+        head = [f"/* {strip_sphinx_marks(doc)} */"] if doc and self.explains else []
         self.structures[name] = "\n".join([*head, "typedef struct {", *rows, f"}} {name};"])
         return name
 
@@ -307,9 +324,13 @@ class Emitter:
     def _literal(self, value: Any, type_: Type) -> str:
         """Return the initializer of a value."""
         if isinstance(type_, Scalar):
-            return number_in_c(value)
+            return self.numeral(value, type_)
         parts = _list(self._literal(item, part) for item, (_, part) in zip(value, members(type_)))
         return f"{{{{{parts}}}}}" if isinstance(type_, Array) else f"{{{parts or '0'}}}"
+
+    def numeral(self, value: float, type_: Scalar) -> str:
+        """Return the initializer of a number."""
+        return number_in_c(value)
 
     def wrap(self, name: str) -> None:
         """Define a function of `math` that fails in the same cases as Python's."""
@@ -325,7 +346,7 @@ class Emitter:
         self._wrappers[name] = f"{head}\n{body}\n}}"
 
 
-class _Definition:
+class Definition:
     """The translation of one function."""
 
     def __init__(self, emitter: Emitter, function: Function) -> None:
@@ -355,41 +376,42 @@ class _Definition:
         ]
         if function.returns != NOTHING and not _ends(function.body):
             body.append(f"{INDENT}{self._left()}")
-        return "\n".join([*_comment(function.doc), *head, *body, "}"])
+        doc = _comment(function.doc) if emitter.explains else []
+        return "\n".join([*doc, *head, *body, "}"])
 
     # Expressions
 
-    def expression(self, expression: Expression, within: int = _TERNARY) -> str:
+    def expression(self, expression: Expression, within: int = TERNARY) -> str:
         """Return an expression, in brackets if the context has a higher precedence."""
-        text, binding = self._bound(expression)
-        if binding != _POSTFIX:
+        text, binding = self.bound(expression)
+        if binding != POSTFIX:
             text = text.replace(_BREAK, " ")
         return text if binding >= within else f"({text})"
 
-    def _bound(self, expression: Expression) -> tuple[str, int]:  # noqa: PLR0911, for each class
+    def bound(self, expression: Expression) -> tuple[str, int]:  # noqa: PLR0911, for each class
         """Return an expression and the precedence of its outermost operator."""
         if isinstance(expression, Number):
             text = number_in_c(expression.value)
-            return text, _UNARY if text.startswith("-") else _POSTFIX
+            return text, _UNARY if text.startswith("-") else POSTFIX
         if isinstance(expression, tree.Text):
-            return unbroken(expression.value), _POSTFIX
+            return unbroken(expression.value), POSTFIX
         if isinstance(expression, Local):
             name = in_c(expression.name)
-            return f"(*{name})" if expression.name in self._addressed else name, _POSTFIX
+            return f"(*{name})" if expression.name in self._addressed else name, POSTFIX
         if isinstance(expression, tree.Constant):
-            return self._emitter.constant(expression), _POSTFIX
+            return self._emitter.constant(expression), POSTFIX
         if isinstance(expression, Field):
-            return f"{self._member(expression.owner)}{in_c(expression.name)}", _POSTFIX
+            return f"{self._member(expression.owner)}{in_c(expression.name)}", POSTFIX
         if isinstance(expression, Item):
             return (
                 f"{self._owner(expression.owner)}v[{self.expression(expression.place)}]",
-                _POSTFIX,
+                POSTFIX,
             )
         if isinstance(expression, Make):
-            return f"({self._emitter.type(expression.type)}){self._initial(expression)}", _POSTFIX
+            return f"({self._emitter.type(expression.type)}){self._initial(expression)}", POSTFIX
         if isinstance(expression, Choice):
             test, this = (self.expression(part, _OR) for part in (expression.test, expression.this))
-            return f"{test} ? {this} : {self.expression(expression.other)}", _TERNARY
+            return f"{test} ? {this} : {self.expression(expression.other)}", TERNARY
         if isinstance(expression, Call):
             addressed = self._emitter.addressed(expression.function)
             given = [
@@ -397,9 +419,13 @@ class _Definition:
                 for name, part in zip(expression.function.arguments, expression.parts)
             ]
             name = self._emitter.names[expression.function]
-            return _call(name, given, expression.function.fails), _POSTFIX
+            return call(name, given, expression.function.fails), POSTFIX
         assert isinstance(expression, Operation)
-        return self._operation(expression)
+        return self.operation(expression)
+
+    def number(self, expression: Expression, within: int = TERNARY) -> str:
+        """Return a number that is not differentiated, in brackets if necessary."""
+        return self.expression(expression, within)
 
     def _address(self, expression: Expression) -> str:
         """Return the address of a value."""
@@ -423,7 +449,7 @@ class _Definition:
         """Return a structure with the operator for access to a member."""
         if isinstance(expression, Local) and expression.name in self._addressed:
             return f"{in_c(expression.name)}->"
-        return f"{self.expression(expression, _POSTFIX)}."
+        return f"{self.expression(expression, POSTFIX)}."
 
     def _owner(self, expression: Expression) -> str:
         """Return an array with the operator for access to a member."""
@@ -446,7 +472,7 @@ class _Definition:
         return f"{{{_list(filled) or '0'}}}"
 
     def _mathematics(self, operation: Operation, op: Operator) -> tuple[str, int]:
-        texts = [self.expression(part) for part in operation.operands]
+        texts = [self.number(part) for part in operation.operands]
         # A macro would take the commas of a structure for its own.
         if any(
             isinstance(part, Make) for each in operation.parts for part in tree.expressions_in(each)
@@ -454,11 +480,11 @@ class _Definition:
             texts = [f"({text})" for text in texts]
         if op.fails:
             self._emitter.wrap(op.function)
-            return _call(f"math_{op.function}", texts, True), _POSTFIX
-        text = _call(op.function, texts, False)
-        return (f"{text} != 0", _EQUALITY) if operation.type == BOOL else (text, _POSTFIX)
+            return call(f"math_{op.function}", texts, True), POSTFIX
+        text = call(op.function, texts, False)
+        return (f"{text} != 0", _EQUALITY) if operation.type == BOOL else (text, POSTFIX)
 
-    def _operation(self, operation: Operation) -> tuple[str, int]:  # noqa: PLR0911, by operator
+    def operation(self, operation: Operation) -> tuple[str, int]:  # noqa: PLR0911, by operator
         op = operation.operator
         if op.function:
             return self._mathematics(operation, op)
@@ -466,22 +492,22 @@ class _Definition:
             sign, binding = _INFIX[op]
             # Compilers warn of a comparison in another one without brackets.
             both = (_SUM, _SUM) if binding < _SUM else (binding, binding + 1)
-            left, right = (self.expression(*each) for each in zip(operation.parts, both))
+            left, right = (self.number(*each) for each in zip(operation.parts, both))
             return f"{left} {sign} {right}", binding
         if op in _CALLED:
-            return _call(_CALLED[op], map(self.expression, operation.parts), op.fails), _POSTFIX
+            return call(_CALLED[op], map(self.number, operation.parts), op.fails), POSTFIX
         if op in (tree.AND, tree.OR):
             sign, binding = (" || ", _OR) if op == tree.OR else (" && ", _AND)
             # Compilers warn of && in || without brackets.
             return sign.join(self.expression(p, _EQUALITY) for p in operation.parts), binding
         [part] = operation.parts
         if op == tree.AS_INT:
-            return self._bound(part)
+            return self.bound(part)
         if op == tree.TO_BOOL:
             zero = "0.0" if part.type == FLOAT else "0"
-            return f"{self.expression(part, _RELATION)} != {zero}", _EQUALITY
+            return f"{self.number(part, _RELATION)} != {zero}", _EQUALITY
         if op == tree.NEGATIVE:
-            return f"-{self.expression(part, _POSTFIX)}", _UNARY
+            return f"-{self.expression(part, POSTFIX)}", _UNARY
         sign = {tree.NOT: "!", tree.TO_FLOAT: "(double)", tree.NARROW: "(int)"}[op]
         return f"{sign}{self.expression(part, _UNARY)}", _UNARY
 
@@ -507,14 +533,15 @@ class _Definition:
             if not isinstance(statement, (tree.Store, tree.Reserve)):
                 lines += [f"{indent}{self._zero(name, types[name])}" for name in new]
             texts = [*self._statement(statement, new, stores, known, indent)]
-            if statement.comment and texts:
+            if statement.comment and texts and self._emitter.explains:
                 texts = _annotated(texts, f"/* {closed(statement.comment)} */", indent)
             lines += texts
         return lines
 
     def _zero(self, name: str, type_: Type) -> str:
         """Return the declaration of a variable that gets its value in a nested block."""
-        value = "0.0" if type_ == FLOAT else "0" if isinstance(type_, Scalar) else "{0}"
+        is_number = self._emitter.is_number(type_)
+        value = "{0}" if not is_number else "0.0" if type_ == FLOAT else "0"
         return f"{self._emitter.declared(type_)}{in_c(name)} = {value};"
 
     def _statement(
@@ -624,7 +651,7 @@ class _Definition:
         returns = self._function.returns
         if returns == NOTHING:
             return "return;"
-        is_number = isinstance(returns, Scalar)
+        is_number = self._emitter.is_number(returns)
         return "return 0;" if is_number else f"return ({self._emitter.type(returns)}){{0}};"
 
     def _raised(self, statement: tree.Raise) -> str:
@@ -634,7 +661,7 @@ class _Definition:
                 form += part.replace("%", "%%")
                 continue
             value, how = part
-            text = self.expression(value)
+            text = self.number(value)
             if value.type == BOOL:
                 text = f'{self.expression(value, _OR)} ? "True" : "False"'
             form += f"%{how}" if how else "%s"

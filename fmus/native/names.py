@@ -59,7 +59,7 @@ def in_c(name: str) -> str:
     if _PREFIXED.fullmatch(name):
         return f"v_{name}"
     stem = name.rstrip("_")
-    is_called = stem in _arithmetic() or stem.removeprefix("math_") in FUNCTIONS
+    is_called = stem in _arithmetic() or re.sub("^(math|dual)_", "", stem) in FUNCTIONS
     return f"{name}_" if stem in _TAKEN or is_called or _MACROS.fullmatch(stem) else name
 
 
@@ -90,6 +90,6 @@ def is_of_library(name: str) -> bool:
 
 @cache
 def _arithmetic() -> frozenset[str]:
-    """Return the functions of arithmetic.h."""
-    text = (RUNTIME / "arithmetic.h").read_text(encoding="utf-8")
-    return frozenset(re.findall(r"^static [\w ]*?(\w+)\(", text, re.MULTILINE))
+    """Return the functions of arithmetic.h and dual.h."""
+    texts = ((RUNTIME / name).read_text(encoding="utf-8") for name in ("arithmetic.h", "dual.h"))
+    return frozenset(re.findall(r"^static [\w ]*?(\w+)\(", "\n".join(texts), re.MULTILINE))

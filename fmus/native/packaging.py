@@ -12,6 +12,7 @@ from typing import NamedTuple
 from fmus import documentation
 from fmus.discovery import Source, digest_of, guid_of, licences, write_archive
 from fmus.kinds import FMI_VERSIONS, NATIVE
+from fmus.native.derivatives import derivatives, derivatives_of_nothing
 from fmus.native.emit import quoted
 from fmus.native.names import RUNTIME
 from fmus.native.tables import tables
@@ -50,6 +51,7 @@ class Parts(NamedTuple):
         documents: documentation and reference results, by their paths in the FMU.
         terminals: the file terminalsAndIcons.xml of FMI 3.0.
         arrays: True if vectors and matrices of one unit are array variables of FMI 3.0.
+        derivatives: the file derivatives.c; None if there are no derivatives.
 
     """
 
@@ -59,6 +61,7 @@ class Parts(NamedTuple):
     documents: Mapping[str, bytes]
     terminals: bytes
     arrays: bool = False
+    derivatives: str | None = None
 
 
 def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
@@ -75,7 +78,9 @@ def _pictures(parts: Parts, fmi: str) -> dict[str, bytes]:
     }
 
 
-def sources_of(equations: str, ports: str, fmi: str) -> dict[str, str]:
+def sources_of(
+    equations: str, ports: str, fmi: str, derivatives: str | None = None
+) -> dict[str, str]:
     """Return the C sources for a version of FMI by their file names, except identity.h."""
     others = {name for version, name in SOURCES.items() if version != fmi}
     return {
@@ -85,6 +90,7 @@ def sources_of(equations: str, ports: str, fmi: str) -> dict[str, str]:
             if path.name not in others
         },
         "equations.c": equations,
+        "derivatives.c": derivatives or derivatives_of_nothing(),
         "ports.h": ports,
     }
 
@@ -115,6 +121,7 @@ def fmu_entries(
         documents,
         terminals_of({"": [variable.port for variable in variables_of(definition.ports, arrays)]}),
         arrays,
+        derivatives(definition),
     )
     return entries_of(parts, fmi, platforms, compiler, report)
 
@@ -135,10 +142,11 @@ def entries_of(
 
     """
     model, name = parts.model, parts.model.identifier
-    describe: Callable[[Model, str], bytes] = fmi2_description
+    has_derivatives = parts.derivatives is not None
+    describe = partial(fmi2_description, has_derivatives=has_derivatives)
     if fmi == "3":
-        describe = partial(fmi3_description, arrays=parts.arrays)
-    texts = sources_of(parts.equations, parts.tables, fmi)
+        describe = partial(fmi3_description, arrays=parts.arrays, has_derivatives=has_derivatives)
+    texts = sources_of(parts.equations, parts.tables, fmi, parts.derivatives)
     written = {name: text.encode() for name, text in texts.items()}
     guid = guid_of(digest_of({**written, "modelDescription.xml": describe(model, "")}))
     written["identity.h"] = _IDENTITY.format(name=quoted(model.name), guid=guid).encode()

@@ -69,7 +69,13 @@ def has_only_doubles(type_: Type) -> bool:
 
 
 def moves(
-    type_: Type, member: str, places: Sequence[int], text: str, depth: int = 0, place: str = ""
+    type_: Type,
+    member: str,
+    places: Sequence[int],
+    text: str,
+    depth: int = 0,
+    place: str = "",
+    whole: str = "",
 ) -> Iterator[str]:
     """Yield statements that move each number of a structure, with loops over arrays.
 
@@ -81,11 +87,13 @@ def moves(
         places: indices of its numbers in an array of doubles.
         text: a statement with `{member}`, `{place}` and `{cast}`.
         depth, place: depth and index of the surrounding loop.
+        whole: the statement for ints, if it differs.
 
     """
     indent = INDENT * depth
     if isinstance(type_, Scalar):
         cast = "" if type_ == FLOAT else "(int)"
+        text = text if type_ == FLOAT else whole or text
         yield indent + text.format(member=member, place=place or places[0], cast=cast)
         return
     if _is_uniform(type_):
@@ -95,13 +103,13 @@ def moves(
         further = f"{step} * {letter}" if step > 1 else letter
         yield f"{indent}for (int {letter} = 0; {letter} < {type_.n}; {letter}++) {{"
         at = f"{before} + {further}" if before else further
-        yield from moves(type_.item, f"{member}.v[{letter}]", places, text, depth + 1, at)
+        yield from moves(type_.item, f"{member}.v[{letter}]", places, text, depth + 1, at, whole)
         yield f"{indent}}}"
         return
     for suffix, part in members(type_):
         n = count(part)
         if n:
-            yield from moves(part, f"{member}{suffix}", places[:n], text, depth)
+            yield from moves(part, f"{member}{suffix}", places[:n], text, depth, whole=whole)
         places = places[n:]
 
 

@@ -15,6 +15,7 @@ from itertools import chain
 from operator import itemgetter
 from string import Formatter
 from textwrap import wrap
+from typing import NamedTuple
 
 from fmus.language import tree
 from fmus.language.build import Program, Untranslatable
@@ -45,7 +46,7 @@ _HEAD = """\
 
 #: Bytes on a thread's stack for the equations. The stack has 512 kB on macOS, and the host and the
 #: runtime need some, too.
-_MOST_ON_STACK = 384 * 1024
+MOST_ON_STACK = 384 * 1024
 
 #: Size of a number in a structure [bytes].
 _NUMBER = 8
@@ -96,8 +97,35 @@ _CALLED = {
 }  # fmt: skip
 
 
-@cache
+class Translation(NamedTuple):
+    """The equations of a component in C.
+
+    Attributes:
+        text: the file equations.c.
+        program: trees of its hooks.
+        emitter: emitter of the equations.
+        passages: conversions of inputs, outputs and state.
+
+    """
+
+    text: str
+    program: Program
+    emitter: Emitter
+    passages: Mapping[str, Passage]
+
+
 def translated(definition: Definition) -> str:
+    """Return the file equations.c of a component.
+
+    Raises:
+        Untranslatable: its text is outside the language of equations.
+
+    """
+    return translation(definition).text
+
+
+@cache
+def translation(definition: Definition) -> Translation:
     """Translate the equations of a component, and add the functions for the runtime.
 
     Raises:
@@ -120,22 +148,13 @@ def translated(definition: Definition) -> str:
             program.refuse("", str(error))
     program.check()
     bytes_on_stack, deep = deepest(program.functions.values())
-    if deep and bytes_on_stack > _MOST_ON_STACK:
+    if deep and bytes_on_stack > MOST_ON_STACK:
         raise Untranslatable(
             f"{deep.name} and the functions that it calls hold "
             f"{bytes_on_stack // _NUMBER} numbers at once; C takes at most "
-            f"{_MOST_ON_STACK // _NUMBER}, since they are on a thread's stack"
+            f"{MOST_ON_STACK // _NUMBER}, since they are on a thread's stack"
         )
     emitter = Emitter(program.functions.values())
-    glue = _glue(emitter, program, behaviour)
-    citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
-    head = _HEAD.format(title=closed(definition.summary), citation=closed(citation))
-    return "\n\n".join([head, emitter.text(), glue]) + "\n"
-
-
-def _glue(emitter: Emitter, program: Program, behaviour: Behaviour) -> str:
-    """Write the functions `model_...`, which the runtime calls, also for missing hooks."""
-    functions = {name: program.function(hook) for name, hook in behaviour.hooks.items() if hook}
     passages = {
         what: _passage(emitter, what, type_of(hint))
         for what, hint in (
@@ -144,6 +163,18 @@ def _glue(emitter: Emitter, program: Program, behaviour: Behaviour) -> str:
             ("state", behaviour.state),
         )
     }
+    glue = _glue(emitter, program, behaviour, passages)
+    citation = "".join(f"\n * {line}" for line in wrap(definition.origin.citation, LINE_WIDTH - 3))
+    head = _HEAD.format(title=closed(definition.summary), citation=closed(citation))
+    text = "\n\n".join([head, emitter.text(), glue]) + "\n"
+    return Translation(text, program, emitter, passages)
+
+
+def _glue(
+    emitter: Emitter, program: Program, behaviour: Behaviour, passages: Mapping[str, Passage]
+) -> str:
+    """Write the functions `model_...`, which the runtime calls, also for missing hooks."""
+    functions = {name: program.function(hook) for name, hook in behaviour.hooks.items() if hook}
     given = {
         "parameters": "*parameters",
         "inputs": passages["inputs"].got("inputs"),
@@ -231,7 +262,7 @@ def _directives(text: str) -> str:
     )
 
 
-def _types(emitter: Emitter, behaviour: Behaviour, passages: dict[str, _Passage]) -> str:
+def _types(emitter: Emitter, behaviour: Behaviour, passages: Mapping[str, Passage]) -> str:
     defined = {
         "model_parameters": emitter.type(type_of(behaviour.parameters)),
         **{f"model_{what}": passage.declaration for what, passage in passages.items()},
@@ -244,7 +275,7 @@ def _types(emitter: Emitter, behaviour: Behaviour, passages: dict[str, _Passage]
 
 
 def _measured(
-    emitter: Emitter, behaviour: Behaviour, outputs: _Passage, function: Function
+    emitter: Emitter, behaviour: Behaviour, outputs: Passage, function: Function
 ) -> list[str]:
     """Return the statements that add noise to a group of outputs."""
     type_ = function.arguments["n"]
@@ -279,7 +310,7 @@ def _defined(returns: str, name: str, arguments: str, body: Sequence[str]) -> st
 
 
 @dataclass
-class _Passage:
+class Passage:
     """Conversion of inputs, outputs or a state between the runtime and the equations.
 
     Attributes:
@@ -307,11 +338,11 @@ class _Passage:
         return f"*{pointer} = {value};"
 
 
-def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
+def _passage(emitter: Emitter, what: str, type_: Type) -> Passage:
     """Return the conversion of inputs, outputs or a state; values of ports have Reals first."""
     name = emitter.type(type_)
     if has_only_doubles(type_) or not count(type_):
-        return _Passage(name, name)
+        return Passage(name, name)
     scalars = [*scalars_in(type_)]
     n = len(scalars)
     places = [*range(n)]
@@ -326,7 +357,7 @@ def _passage(emitter: Emitter, what: str, type_: Type) -> _Passage:
         function(f"static {name} {gather}(const double from[])", taken, ()),
         function(f"static void {scatter}({name} it, double to[])", [*scattered], ()),
     )
-    return _Passage(name, f"struct {{\n    double v[{n}];\n}}", gather, scatter, functions)
+    return Passage(name, f"struct {{\n    double v[{n}];\n}}", gather, scatter, functions)
 
 
 def deepest(

@@ -228,7 +228,7 @@ _CAPABILITIES_2 = {
 }
 
 
-def fmi2_description(model: Model, guid: str) -> bytes:
+def fmi2_description(model: Model, guid: str, has_derivatives: bool = False) -> bytes:
     """Write the description of a model whose library contains the GUID."""
     root = _root("2.0", model, guid=guid)
     for interface in ("ModelExchange", "CoSimulation") if model.local else ("CoSimulation",):
@@ -240,6 +240,8 @@ def fmi2_description(model: Model, guid: str) -> bytes:
     complete(root, (*model.ports, FAULT, *model.local))
     implementation = _element(root, "CoSimulation")
     implementation.attrib.update(_capabilities(model, implementation.attrib))
+    if has_derivatives:
+        implementation.attrib["providesDirectionalDerivative"] = "true"
     if model.local:
         root.attrib["numberOfEventIndicators"] = str(len(local_in(model.local).switches))
         of_exchange = {name: value for name, value in _CAPABILITIES_2.items() if name != _ANY_STEP}
@@ -322,7 +324,9 @@ _CAPABILITIES_3 = {**_CAPABILITIES, "canGetAndSetFMUState": "true", "canSerializ
 _PLATFORMS = ("x86_64-linux", "aarch64-linux", "x86_64-windows", "x86_64-darwin", "aarch64-darwin")
 
 
-def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
+def fmi3_description(
+    model: Model, token: str, arrays: bool = False, has_derivatives: bool = False
+) -> bytes:
     """Write the description of a model whose library contains the token.
 
     With `arrays`, vectors and matrices of one unit are array variables.
@@ -334,6 +338,9 @@ def fmi3_description(model: Model, token: str, arrays: bool = False) -> bytes:
     if model.local:
         of_exchange = {name: value for name, value in capabilities.items() if name != _ANY_STEP}
         SubElement(root, "ModelExchange", of_exchange, modelIdentifier=model.identifier)
+    if has_derivatives:
+        names = ("providesDirectionalDerivatives", "providesAdjointDerivatives")
+        capabilities |= dict.fromkeys(names, "true")
     SubElement(root, "CoSimulation", capabilities, modelIdentifier=model.identifier)
     root.extend(
         (

@@ -21,6 +21,7 @@ from orchestrator.machine.compilers import machines_compiler
 from orchestrator.machine.disk import hold_lock
 from orchestrator.runs.own_components import build_own
 from reference import example_span, write_component_reference
+from support.derivatives import check
 from support.examples import EXAMPLES, NAMES, load
 from support.tiers import slow
 
@@ -75,6 +76,11 @@ def test_both_kinds_are_valid_and_give_the_bits_of_plain_python(fmu, name: str):
                 column = np.append(column[:1], column[:-1])
             # Not by ==, to which both zeros are equal.
             assert column.tobytes() == found[port].tobytes(), (kind, port)
+
+
+@each
+def test_derivatives_are_those_of_differences(fmu, tmp_path: Path, name: str):
+    check(fmu(name, NATIVE), tmp_path, share=0.4)
 
 
 @pytest.mark.slow

@@ -149,6 +149,12 @@ CALLS: dict[tuple[str, str], Callable[[Host], Status]] = {
     ("fmi3SetFloat64", "the time"): numbers("fmi3SetFloat64", 1, "time"),
     ("fmi3GetFloat64", "more values than references"): numbers("fmi3GetFloat64", 2),
     ("fmi3SetInt32", "fewer values than references"): numbers("fmi3SetInt32", 0),
+    **{
+        (function, "n = 0, with NULL"): lambda host, function=function: call(
+            host, function, *[None] * 8
+        )
+        for function in ("fmi3GetDirectionalDerivative", "fmi3GetAdjointDerivative")
+    },
     ("fmi3DoStep", "NULL for an output argument"): lambda host: call(
         host, "fmi3DoStep", c_double(0.0), c_double(H), c_bool(True), None, None, None, None
     ),

@@ -509,7 +509,6 @@ _plain("fmi2DeSerializeFMUstate", "state NULL", bytes=b"{}", null=True)
 _UNSUPPORTED = (
     "fmi2SetRealInputDerivatives",
     "fmi2GetRealOutputDerivatives",
-    "fmi2GetDirectionalDerivative",
     *MODEL_EXCHANGE_FUNCTIONS,
 )
 for _function in _UNSUPPORTED:

@@ -1,7 +1,7 @@
 /* The component: the code between the equations and ports of a model and the functions of FMI.
  *
  * fmi2.c and fmi3.c include this file, each in one translation unit, and define NAMED,
- * FIRST_REFERENCE, HAS_TIME, `version` and call_logger. A function of FMI is then
+ * FIRST_REFERENCE, `version` and call_logger. A function of FMI is then
  *
  *     FUNCTION(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
  *
@@ -11,10 +11,12 @@
  * run.c        modes and steps
  * exchange.c   model exchange, for components with rates
  * state.c      the state as bytes, and the checks before it is restored
+ * derivative.c derivatives of outputs
  *
  * docs/reference/fmi-answers.md lists the answers to all calls.
  */
 #include "equations.c"
+#include "derivatives.c"
 #include "identity.h"
 
 typedef enum { REAL, INTEGER, BOOLEAN, ENUMERATION } fmi_type;
@@ -24,6 +26,7 @@ typedef struct {
     string types[ENUMERATION + 1]; /* types of values */
     int enumerations_are_integers; /* true if functions for Integers pass them */
     string token;                  /* name of the GUID or token */
+    int has_time;                  /* true if the time is a variable */
 } names;
 
 static const names version;
@@ -118,6 +121,15 @@ typedef struct {
     int fault;
 } run;
 
+/* Derivatives: seeds, and what follows from them. */
+typedef struct {
+    parameter_values parameters;
+    input_values inputs;
+    state_values state;
+    double time;
+    output_values outputs;
+} directions;
+
 struct instance {
     listener host;
     int in_error;
@@ -136,6 +148,7 @@ struct instance {
     /* Values that a call sets, until all are checked. */
     parameter_values set_parameters;
     input_values set_inputs;
+    directions along; /* for derivatives */
 };
 
 #include "ports.h"
@@ -148,6 +161,7 @@ struct instance {
 #include "run.c"
 #include "exchange.c"
 #include "state.c"
+#include "derivative.c"
 
 /* Functions of FMI have arguments that components do not use. */
 #if defined(__GNUC__)

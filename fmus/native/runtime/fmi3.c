@@ -1,7 +1,6 @@
 /* The functions of FMI 3.0, and the file to compile: it includes all others.
  *
- * Functions that neither co-simulation nor model exchange needs without clocks and derivatives
- * return fmi3Error.
+ * Functions that neither co-simulation nor model exchange needs without clocks return fmi3Error.
  */
 #include "platform.h"
 
@@ -14,13 +13,14 @@
 #endif
 
 /* Value references are indices of the variables, from 1, since some hosts use them as such. */
-enum { FIRST_REFERENCE = 1, HAS_TIME = 1 };
+enum { FIRST_REFERENCE = 1 };
 
 #include "component.c"
 
 static const names version = {
     .types = {"Float64", "Int32", "Boolean", "Enumeration"},
     .token = "instantiation token",
+    .has_time = 1,
 };
 
 /* fmi3Boolean and fmi3Clock. A host may pass any byte, although a bool is 0 or 1. */
@@ -244,6 +244,45 @@ EXCHANGED(fmi3GetNumberOfContinuousStates, MASK_Get, wrong_place(n), (void *c, s
 EXCHANGED(fmi3GetNumberOfEventIndicators, MASK_Get, wrong_place(n), (void *c, size_t *n),
           *n = MODEL_SWITCHES)
 
+/* Derivatives */
+
+/* One pass for each known: the equations are not run backwards. */
+static void get_adjoint(call *this, const uint32_t unknowns[], size_t n_unknowns,
+                        const uint32_t knowns[], size_t n_knowns, const double seed[],
+                        double sensitivity[]) {
+    directions *along = &this->instance->along;
+    size_t n = 0;
+    if (!can_differentiate(this, unknowns, n_unknowns, knowns, n_knowns)) return;
+    for (size_t i = 0; i < n_knowns; i++) {
+        for (uint32_t e = 0; e < span(knowns[i]); e++) {
+            double sum = 0.0;
+            size_t k = 0;
+            memset(along, 0, sizeof *along);
+            put_seed(along, knowns[i] + e, 1.0);
+            if (!differentiate(this)) return;
+            for (size_t u = 0; u < n_unknowns; u++) {
+                for (uint32_t f = 0; f < span(unknowns[u]); f++) {
+                    sum += seed[k++] * along->outputs.values[port_at(unknowns[u] + f)->place];
+                }
+            }
+            sensitivity[n++] = sum;
+        }
+    }
+    check_slopes(this, sensitivity, n);
+}
+
+#define DERIVATIVE(name, get, known, n_known, unknown, n_unknown)                                \
+    FUNCTION(name, MASK_Get, NULL,                                                               \
+             (void *c, const uint32_t unknowns[], size_t n_unknowns, const uint32_t knowns[],    \
+              size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],         \
+              size_t n_sensitivity),                                                             \
+             if (check(&this, wrong_numbers(n_knowns, knowns, known, n_known)) &&                \
+                 check(&this, wrong_numbers(n_unknowns, unknowns, unknown, n_unknown)))          \
+                 get(&this, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity))
+
+DERIVATIVE(fmi3GetDirectionalDerivative, get_directional, seed, n_seed, sensitivity, n_sensitivity)
+DERIVATIVE(fmi3GetAdjointDerivative, get_adjoint, sensitivity, n_sensitivity, seed, n_seed)
+
 /* Unsupported functions */
 
 #define UNSUPPORTED(name, ...)                                                                   \
@@ -257,12 +296,6 @@ UNSUPPORTED(fmi3GetVariableDependencies, void *c, uint32_t variable, size_t elem
             uint32_t independents[], size_t independent_elements[], int kinds[], size_t n)
 UNSUPPORTED(fmi3GetOutputDerivatives, void *c, const uint32_t r[], size_t n, const int32_t orders[],
             double v[], size_t n_v)
-UNSUPPORTED(fmi3GetDirectionalDerivative, void *c, const uint32_t unknowns[], size_t n_unknowns,
-            const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
-            double sensitivity[], size_t n_sensitivity)
-UNSUPPORTED(fmi3GetAdjointDerivative, void *c, const uint32_t unknowns[], size_t n_unknowns,
-            const uint32_t knowns[], size_t n_knowns, const double seed[], size_t n_seed,
-            double sensitivity[], size_t n_sensitivity)
 UNSUPPORTED(fmi3GetIntervalDecimal, void *c, const uint32_t r[], size_t n, double intervals[],
             int qualifiers[])
 UNSUPPORTED(fmi3GetIntervalFraction, void *c, const uint32_t r[], size_t n, uint64_t counters[],

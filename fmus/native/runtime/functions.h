@@ -78,12 +78,18 @@ FUNCTION(fmi2DeSerializeFMUstate, MASK_FMUstate, NULL,
          (void *c, const char bytes[], size_t size, void **state),
          deserialise_state(&this, bytes, size, state))
 
-/* Unsupported functions */
+/* Derivatives; the Python kind has none. */
 
-FORWARDED(fmi2GetDirectionalDerivative, MASK_NotSupported, NULL,
+FORWARDED(fmi2GetDirectionalDerivative, MASK_Get, NULL,
           (void *c, const uint32_t u[], size_t nu, const uint32_t k[], size_t nk,
            const double dk[], double du[]),
-          (c, u, nu, k, nk, dk, du), refuse_unsupported(&this, FMI_ERROR))
+          (c, u, nu, k, nk, dk, du),
+          if (check(&this, wrong_values(nu, u, du)) && check(&this, wrong_values(nk, k, dk))) {
+              get_directional(&this, u, nu, k, nk, dk, du);
+          })
+
+/* Unsupported functions */
+
 FORWARDED(fmi2SetRealInputDerivatives, MASK_NotSupported, NULL,
           (void *c, const uint32_t r[], size_t n, const int order[], const double v[]),
           (c, r, n, order, v), refuse_unsupported(&this, FMI_ERROR))

@@ -8,6 +8,7 @@ from pathlib import Path
 import fmpy
 
 from fmus.discovery import write_archive
+from fmus.native.derivatives import derivatives
 from fmus.native.packaging import sources_of
 from fmus.native.tables import tables
 from fmus.native.translator import translated
@@ -46,7 +47,8 @@ def definition(variant: str = "read") -> Definition:
 
 def sources(definition: Definition, fmi: str = "2") -> dict[str, str]:
     """Return the C sources of a component by their file names, except identity.h."""
-    return sources_of(translated(definition), tables(definition), fmi)
+    written = translated(definition), tables(definition), fmi, derivatives(definition)
+    return sources_of(*written)
 
 
 def native(

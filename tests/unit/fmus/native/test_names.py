@@ -38,7 +38,9 @@ static double use_{i}(double {name}, Error *error) {{
     if (isfinite({name}) != 0 && isnan({name}) == 0 && isinf({name}) == 0) return INFINITY;
     for (int i_{i} = 0; i_{i} < 2; i_{i}++) raise_error(error, "%g", {name});
     const int k_{i} = int_of(trunc({name}), error) + place_in(2, 3, error);
-    return y_{i} + it_{i}.{name} + fabs({name}) + k_{i} + math_sqrt({name}, error) + NAN;
+    const Dual d_{i} = dual_div(dual_add((Dual){{{name}, 1.0}}, dual_fixed(2.0)),
+        dual_larger(dual_neg(dual_fixed({name})), dual_fixed(1.0)), error);
+    return y_{i} + it_{i}.{name} + fabs({name}) + k_{i} + math_sqrt({name}, error) + NAN + d_{i}.d;
 }}
 """
 
@@ -70,7 +72,8 @@ def test_every_name_that_a_compiler_knows_can_be_a_variable_and_a_function(tmp_p
     text = run(command, tmp_path, "-E", "fmi2.c") + run(command, tmp_path, "-E", "-dM", "fmi2.c")
     words = sorted({*re.findall(r"\b[A-Za-z_]\w*", text)})
     assert {"size_t", "strlen", "math_errhandling", "EOF"} <= {*words}
-    emitter, own = Emitter([]), re.findall(r"\w+", files["equations.c"])
+    emitter = Emitter([])
+    own = re.findall(r"\w+", files["equations.c"] + files["derivatives.c"])
     composed = [word for word in words if re.match("[A-Za-z]+_.", word)]
     functions = [emitter.unused(word) for word in composed if word not in own]
     code = [f"static double {name}(double x) {{ return x; }}" for name in functions]
