@@ -36,6 +36,9 @@ from auv_fmu.proof.gain_conditions import coupling
 from fmus.discovery import FILLED, components, source_of
 from fmus.documentation import component_page
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
+from fmus.ports.definition import Definition
+from fmus.ports.description import local_in
+from fmus.script import script_in, source_of_script
 from orchestrator.commands.main import COMMANDS, parser
 from orchestrator.figures.run_figures import FIGURES, FLEET
 from orchestrator.figures.study_values import Values
@@ -155,6 +158,7 @@ def files() -> dict[Path, str]:
         "reference/command-line.md": command_line(),
         "reference/compatibility.md": {"checkers": compatibility()},
         "reference/components/README.md": {"components": bundle()},
+        "reference/derivatives.md": {"components": differentiated()},
         "reference/examples.md": examples(),
         "explanation/ready-studies.md": {
             "studies": "\n\n".join(map(_section, map(read_study, ready_studies())))
@@ -538,6 +542,24 @@ def _first_line(name: str) -> str:
     """First line of an example's docstring."""
     text = (EXAMPLES / name / f"{name}.py").read_text(encoding="utf-8")
     return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
+
+
+def differentiated() -> str:
+    """Table of the Reals of each component and example."""
+    sources = {f"[{name}](components/{name}.md)": source_of(name) for name in components()}
+    for path in sorted(EXAMPLES.glob("*/*.py")):
+        if path.stem == path.parent.name:
+            sources[_link(path.stem)] = source_of_script(script_in(path.parent))
+    head = ("component", "outputs", "inputs", "parameters", "states", "event indicators")
+    return table(head, [(link, *_reals(source.definition)) for link, source in sources.items()])
+
+
+def _reals(definition: Definition) -> Iterator[str]:
+    """Yield the numbers of a component's Reals."""
+    local = local_in(definition.local)
+    reals = Counter(port.causality for port in definition.ports if port.type == "Real")
+    counts = (*map(reals.get, ("output", "input", "parameter")), len(local.states))
+    yield from (str(n or "") for n in (*counts, len(local.switches)))
 
 
 def gallery() -> dict[str, str]:

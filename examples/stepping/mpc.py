@@ -33,11 +33,11 @@ def residuals(plants, auv, tries, before, y_d):
     return np.hstack((errors, WEIGHT * tries, CHANGE * changes)).reshape(len(tries), -1)
 
 
-def mpc(reference):
-    """Return the result of the vehicle that follows the reference of another result."""
-    y_d = reference.group("planner.y_d.x", "planner.y_d.y", "planner.y_d.z")[::HOLD]
-    y_d = np.concatenate((y_d[1:], np.tile(y_d[-1], (MOVES, 1))))
+def mpc():
+    """Return the result of the vehicle, with a reference that is known beyond the stop."""
     auv = Simulation("fig4", QUIET)
+    ahead = simulate("fig4", QUIET, stop_time=STOP + MOVES * HOLD * auv.step_size)
+    y_d = ahead.group("planner.y_d.x", "planner.y_d.y", "planner.y_d.z")[HOLD::HOLD]
     plants = Simulations({"only": ["plant"]}, 1 + 3 * MOVES, QUIET)
     pushes = np.insert(np.eye(3 * MOVES), 0, 0.0, axis=0).reshape(-1, MOVES, 3)
     taus, before = np.zeros((MOVES, 3)), np.zeros(3)
@@ -55,7 +55,7 @@ def mpc(reference):
 if __name__ == "__main__":
     paper = simulate("fig4", QUIET, stop_time=STOP)
     pd = {"components": {"controller": "PdController"}, "wires": {"controller.dy": "plant.dy"}}
-    results = {"paper": paper, "PD": simulate(pd, QUIET, stop_time=STOP), "MPC": mpc(paper)}
+    results = {"paper": paper, "PD": simulate(pd, QUIET, stop_time=STOP), "MPC": mpc()}
     print("       within 0.5 m   final error   effort in u, q, r")
     for name, result in results.items():
         errors = result["plant.y"] - result["planner.y_d"]

@@ -9,6 +9,7 @@ module               content
 :mod:`.arrays`       operators of vectors and matrices
 :mod:`.words`        names of Python's constructs, and advice on replacing some
 :mod:`.build`        translation of Python functions to trees, which defines the language
+:mod:`.symbols`      evaluation of trees with symbols of CasADi in place of numbers
 ==================== ===================================================================
 
 `docs/explanation/language.md` describes the language for users.

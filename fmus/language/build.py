@@ -206,7 +206,7 @@ class Program:
         node = _definition(path, line)
         if node is None:
             raise TypeError(f"{path}:{line}: {function.__name__} is not made by def in a module")
-        made = Function(function.__module__, function.__name__, {}, sizes=types)
+        made = Function(function.__module__, function.__name__, {}, sizes=types, path=path)
         self._begun.add(key)
         given = dict(zip((argument.arg for argument in _arguments(node)), types))
         try:
@@ -552,6 +552,8 @@ class _Builder:
             with _Noting(self, node):
                 self._statement(node, statements)
             self._before = None
+            for statement in statements[before:]:
+                statement.line = node.lineno
             about = _comments(self.path).get(node.end_lineno or 0)
             is_simple = not isinstance(
                 node, (ast.If, ast.While, ast.For, ast.FunctionDef, ast.Match)
@@ -799,7 +801,8 @@ class _Builder:
 
     def _inner(self, word: str, own: set[str], node: ast.FunctionDef | None = None) -> _Builder:
         """Return the builder of a nested function."""
-        made = Function(self.made.module, f"{self.made.name}_{word}", {}, sizes=self.made.sizes)
+        name, sizes = f"{self.made.name}_{word}", self.made.sizes
+        made = Function(self.made.module, name, {}, sizes=sizes, path=self.path)
         inner = _Builder(self.program, self.path, self.scope, made, node)
         inner.functions = {
             name: called

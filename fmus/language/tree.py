@@ -210,10 +210,12 @@ class Statement:
 
     Attributes:
         comment: comment on its line in the source.
+        line: its line in the source; 0 if it is not there.
 
     """
 
     comment: str = field(default="", init=False)
+    line: int = field(default=0, init=False)
 
 
 @dataclass
@@ -322,6 +324,7 @@ class Function:
         doc: its docstring.
         fails: True if it can fail.
         by_address: an argument, which is an array, that is not copied; empty if there is none.
+        path: its file; empty for functions of operators.
 
     """
 
@@ -334,6 +337,7 @@ class Function:
     doc: str = ""
     fails: bool = False
     by_address: str = ""
+    path: str = ""
 
     def end(self, body: Sequence[Statement]) -> None:
         """Set its body, and the flag `fails`."""

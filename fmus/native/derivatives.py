@@ -1,4 +1,4 @@
-"""The derivatives of a component's outputs in C: its equations for dual numbers."""
+"""The derivatives of a component in C: its equations for dual numbers."""
 
 from __future__ import annotations
 
@@ -22,18 +22,19 @@ _ARGUMENTS = {
     "parameters": "const model_parameters *parameters",
     "dparameters": "const model_parameters *dparameters",
     "state": "const model_state *state",
-    "dstate": "const model_state *dstate",
+    "dstate": "model_state *dstate",
     "inputs": "const model_inputs *inputs",
     "dinputs": "const model_inputs *dinputs",
     "t": "double t",
     "dt": "double dt",
     "draws": "const double draws[]",
     "doutputs": "model_outputs *doutputs",
+    "drates": "double drates[]",
     "error": "Error *error",
 }  # fmt: skip
 
 _HEAD = """\
-/* Derivatives of the outputs: the functions of equations.c for dual numbers. */
+/* Derivatives of outputs and rates: the functions of equations.c for dual numbers. */
 #include "dual.h"
 
 enum {{ MODEL_DIFFERENTIABLE = {} }};"""
@@ -97,6 +98,7 @@ def derivatives(definition: Definition) -> str | None:
             f"{dual.type(groups['state'])} x;",
             "if (starts) {",
             f"    x = {calls['start']};",
+            f"    {passages['state'].put('dstate', 'model_slopes_of_state(x)')}",
             "} else {",
             f"    x = {joined['state']};",
             "}",
@@ -110,21 +112,29 @@ def derivatives(definition: Definition) -> str | None:
     lines.append(f"{dual.type(hooks['outputs'].returns)} y = {calls['outputs']};")
     if behaviour.noisy:
         lines.append(f"{given[behaviour.noisy]} = {calls['measured']};")
-    lines.append(passages["outputs"].put("doutputs", "model_slopes(y)"))
+    lines.append(passages["outputs"].put("doutputs", "model_slopes_of_outputs(y)"))
+    if "rates" in hooks:
+        type_ = hooks["rates"].returns
+        lines.append(f"const {dual.type(type_)} dx = {calls['rates']};")
+        lines += moves(type_, "dx", range(count(type_)), "drates[{place}] = {member}.d;")
+    given_back = {"outputs": hooks["outputs"].returns}
+    if "start" in hooks:
+        given_back["state"] = groups["state"]
     parts = [
         *(_joined(emitter, dual, name, groups[name]) for name in groups if name in taken),
-        _slopes(emitter, dual, hooks["outputs"].returns),
+        *(_slopes(emitter, dual, name, type_) for name, type_ in given_back.items()),
         function(_DIFFERENTIATE, lines, [*_ARGUMENTS]),
     ]
     return "\n\n".join([_HEAD.format(1), dual.text(), *parts]) + "\n"
 
 
 def _hooks(behaviour: Behaviour, program: Program) -> dict[str, Function]:
-    """Return the hooks that outputs follow from."""
+    """Return the hooks that outputs and rates follow from."""
     hooks: dict[str, Function] = {}
     for name, given in {
         "measured": "",
         "outputs": "",
+        "rates": "",
         "derive": "derived",
         "restarted": "state",
         "start": "state",
@@ -156,10 +166,10 @@ def _joined(emitter: Emitter, dual: DualEmitter, name: str, type_: Type) -> str:
     return function(head, [f"{made} it = {{0}};", *body, "return it;"], ("v", "d"))
 
 
-def _slopes(emitter: Emitter, dual: DualEmitter, type_: Type) -> str:
-    """Write the function that takes the derivatives out of outputs."""
+def _slopes(emitter: Emitter, dual: DualEmitter, name: str, type_: Type) -> str:
+    """Write the function that takes derivatives out of their pairs with values."""
     given, made = dual.type(type_), emitter.type(type_)
     places = range(count(type_))
     body = moves(type_, "", places, "it{member} = y{member}.d;", whole="it{member} = 0;")
-    head = f"static {made} model_slopes({given} y)"
+    head = f"static {made} model_slopes_of_{name}({given} y)"
     return function(head, [f"{made} it = {{0}};", *body, "return it;"], ("y",))

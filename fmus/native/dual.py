@@ -21,7 +21,7 @@ _CALLED: dict[Operator, str] = {
 
 
 class DualEmitter(Emitter):
-    """Functions of dual numbers in C, which stand in one file with the functions of floats."""
+    """Functions of dual numbers in C, beside the functions of floats."""
 
     real, explains = "Dual", False
 
@@ -52,8 +52,8 @@ class DualEmitter(Emitter):
             for argument, slope in zip(names, about.slopes)
             if slope != "0.0"
         ]
-        given = [*(f"Dual d{argument}" for argument in names), "Error *error"]
-        head = f"static inline Dual dual_{name}({', '.join(given[: None if about.raises else -1])})"
+        given = [f"Dual d{argument}" for argument in names] + ["Error *error"] * bool(about.raises)
+        head = f"static inline {self.real} dual_{name}({', '.join(given)})"
         numbers = ", ".join(f"{argument} = d{argument}.v" for argument in names)
         result = f"return (Dual){{z, {' + '.join(parts) or '0.0'}}};"
         self._wrappers[name] = function(head, [f"const double {numbers}, z = {value};", result], ())

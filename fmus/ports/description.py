@@ -240,12 +240,13 @@ def fmi2_description(model: Model, guid: str, has_derivatives: bool = False) -> 
     complete(root, (*model.ports, FAULT, *model.local))
     implementation = _element(root, "CoSimulation")
     implementation.attrib.update(_capabilities(model, implementation.attrib))
-    if has_derivatives:
-        implementation.attrib["providesDirectionalDerivative"] = "true"
     if model.local:
         root.attrib["numberOfEventIndicators"] = str(len(local_in(model.local).switches))
         of_exchange = {name: value for name, value in _CAPABILITIES_2.items() if name != _ANY_STEP}
         _element(root, "ModelExchange").attrib.update(of_exchange)
+    if has_derivatives:
+        for element in root.iterfind("*[@modelIdentifier]"):
+            element.attrib["providesDirectionalDerivative"] = "true"
     return document(root)
 
 
@@ -335,12 +336,12 @@ def fmi3_description(
     variables = variables_of(ports, arrays)
     root = _root("3.0", model, instantiationToken=token)
     capabilities = _capabilities(model, _CAPABILITIES_3)
-    if model.local:
-        of_exchange = {name: value for name, value in capabilities.items() if name != _ANY_STEP}
-        SubElement(root, "ModelExchange", of_exchange, modelIdentifier=model.identifier)
     if has_derivatives:
         names = ("providesDirectionalDerivatives", "providesAdjointDerivatives")
         capabilities |= dict.fromkeys(names, "true")
+    if model.local:
+        of_exchange = {name: value for name, value in capabilities.items() if name != _ANY_STEP}
+        SubElement(root, "ModelExchange", of_exchange, modelIdentifier=model.identifier)
     SubElement(root, "CoSimulation", capabilities, modelIdentifier=model.identifier)
     root.extend(
         (

@@ -31,7 +31,7 @@ _REST, _ROUNDING = (1e-10, 1e-12), (1e-14, 1e-14)
 #: step.
 _MOST_ROUNDS, _MOST_STEPS, _MOST_HALVINGS = 1000, 50, 10
 
-#: Derivatives are used again while each step leaves at most this share of the difference: those of
+#: Derivatives are used again while each step leaves at most this share of the difference: ones from
 #: differences, and exact ones, which cost less and converge faster.
 _GOOD_STEP, _EXACT_STEP = 0.1, 1e-3
 

@@ -58,3 +58,15 @@ def parquet() -> Any:
     if find_spec("pyarrow") is None:
         raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
     return import_module("pyarrow.parquet")
+
+
+def casadi() -> Any:
+    """Return CasADi.
+
+    Raises:
+        InputError: it is not installed.
+
+    """
+    if find_spec("casadi") is None:
+        raise InputError("functions of CasADi need casadi: pip install 'auv-fmu[casadi]'")
+    return import_module("casadi")

@@ -9,5 +9,6 @@ module               content
 :mod:`.files`        C files for other programs, such as firmware
 :mod:`.fmu`          one FMU of the whole system
 :mod:`.library`      compilation, cache and calls
+:mod:`.functions`    functions of CasADi
 ===================  ===============================================================
 """

@@ -19,7 +19,7 @@ from fmus.language.build import Untranslatable
 from fmus.native.translator import translated
 from fmus.ports.definition import Definition, define
 from fmus.ports.port import Misdeclared
-from fmus.script import is_component
+from fmus.script import is_component, script_in
 from orchestrator.cosim import Component, System
 from orchestrator.machine.disk import sha256_of
 from orchestrator.machine.errors import InputError, reason, shortened
@@ -120,6 +120,21 @@ def _own(component: Component, origin: Origin) -> Definition:
     if changed := origin.changed(fmu):
         names = shortened(", ".join(path.name for path in changed))
         raise InputError(f"{names} has changed since {fmu.name} was built: build it again")
+    return definition_in(script)
+
+
+def definition_in(path: Path) -> Definition:
+    """Return the definition of a user's component from its script, or the folder of one.
+
+    Raises:
+        InputError: there is no such script, or it cannot be loaded, or is a slave of PythonFMU.
+        Misdeclared: it is not a valid definition.
+
+    """
+    try:
+        script = script_in(path)
+    except ValueError as error:
+        raise InputError(str(error)) from None
     if not is_component(script):
         raise InputError(
             f"{script.name} is a slave of PythonFMU, and not in the language of equations"
@@ -136,7 +151,10 @@ def _load(script: Path) -> ModuleType:
     """
     folder, name = script.resolve().parent, script.stem
     _forget_others(folder)
-    if name in sys.modules and name not in _loaded:
+    known = sys.modules.get(name)
+    if known is not None and name not in _loaded:
+        if getattr(known, "__file__", None) == str(script.resolve()):
+            return known
         raise InputError(f"{name} is already a module of Python; choose another name")
     importlib.invalidate_caches()
     writes, sys.dont_write_bytecode = sys.dont_write_bytecode, True

@@ -521,6 +521,39 @@ def indices_of(system: System, loop: Loop, reducers: Iterable[Reducer]) -> Itera
             yield Index(reducer, [sources[port.name] for port in reducer.ports])
 
 
+def straight(plan: Plan) -> Plan:
+    """Return the plan with the order that a program has.
+
+    Raises:
+        Unsupported: the system has a ring of direct feedthroughs, or goes back in time.
+
+    """
+    if plan.rings:
+        names = listed(plan.rings[0])
+        raise Unsupported(f"direct feedthroughs of {names} form a ring, which no program can have")
+    if plan.experiment.coupling == "linear":
+        raise Unsupported("coupling linear goes back in time, which no program can")
+    return replace(plan, experiment=replace(plan.experiment, order=plan.arrangement.order))
+
+
+def start_of(system: System, name: PortName, port: Port) -> float | int | bool:
+    """Return the value of a parameter or an unconnected input at the start.
+
+    Args:
+        system: with the value, if it is set.
+        name: of the parameter or input.
+        port: its declaration.
+
+    """
+    value = system.value(name)
+    if isinstance(value, str):
+        value = int(system.variable(name).items[value])
+    if value is None:
+        value = port.start or 0
+    types: dict[str, type[float | int | bool]] = {"Real": float, "Boolean": bool}
+    return types.get(port.type, int)(value)
+
+
 @dataclass
 class Text:
     """The program of a system.
@@ -562,17 +595,7 @@ class Text:
         """
         #: Functions of connections that map values: beginnings by the rest of the text.
         self._mappings: dict[str, str] = {}
-        if self.plan.rings:
-            names = listed(self.plan.rings[0])
-            raise Unsupported(
-                f"direct feedthroughs of {names} form a ring, which no program can have"
-            )
-        if self.plan.experiment.coupling == "linear":
-            raise Unsupported("coupling linear goes back in time, which no program can")
-        arrangement = self.plan.arrangement
-        self.plan = replace(
-            self.plan, experiment=replace(self.plan.experiment, order=arrangement.order)
-        )
+        self.plan = straight(self.plan)
         self.stages = self.plan.stages()
         self.passes = self.stages.passing is not None
         #: If set, values may change between steps.
@@ -667,14 +690,7 @@ class Text:
             system: with other values of the same parameters; None: the system of the plan.
 
         """
-        system = system or self.plan.system
-        value, port = system.value(name), self.ports[name]
-        if isinstance(value, str):
-            value = int(system.variable(name).items[value])
-        if value is None:
-            value = port.start or 0
-        types: dict[str, type[float | int | bool]] = {"Real": float, "Boolean": bool}
-        return types.get(port.type, int)(value)
+        return start_of(system or self.plan.system, name, self.ports[name])
 
     def _inputs(self, name: str) -> dict[PortName, Place]:
         return self._named(name, "input", "inputs", f"it->{self.members[name]}.inputs")

@@ -21,6 +21,7 @@ subpackage        contents
 :mod:`.water`     waves and currents of a sea, not in the paper
 :mod:`.guidance`  paths, tracks, formations and their messages, not in the paper
 :mod:`.loop`      Fig. 2 as straight-line Python, with all of these
+:mod:`.casadi`    components as functions of CasADi; not part of any FMU
 ================  ========================================================================
 
 Each imports only from those above it, and lists its modules in its own docstring.

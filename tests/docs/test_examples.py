@@ -35,13 +35,14 @@ from support.tiers import slow
 pytestmark = pytest.mark.usefixtures("workplace")
 
 (
-    ACCURACY, BATCH, EVENTS, EXAMPLES, EXCHANGE, EXPORT, LEARN, LIBCOSIM, PARAMETERS, PYTHON, ROS,
-    SCENARIOS, STEP, STUDIES, TEST_ONE, TRAJECTORIES, VEHICLES,
+    ACCURACY, BATCH, DERIVATIVES, EVENTS, EXAMPLES, EXCHANGE, EXPORT, LEARN, LIBCOSIM, PARAMETERS,
+    PYTHON, ROS, SCENARIOS, STEP, STUDIES, TEST_ONE, TRAJECTORIES, VEHICLES,
 ) = (
     DOCS / f"{name}.md"
     for name in (
         "explanation/accuracy",
         "explanation/batch",
+        "how-to/derivatives",
         "how-to/events",
         "reference/examples",
         "how-to/hosts/model-exchange",
@@ -114,6 +115,33 @@ def test_events_in_python_are_told(capsys):
 def test_changed_gain_in_python_gives_an_error_each(capsys):
     lines = executed(PARAMETERS, capsys)
     assert [line.split()[0] for line in lines] == ["50.0", "25.0"]
+
+
+def test_an_fmu_gives_the_derivatives_of_the_page(native, capsys):
+    Path("dist").mkdir()
+    shutil.copy(native / "AuvPlant.fmu", "dist")
+    found = executed(DERIVATIVES, capsys)
+    assert found == answers(DERIVATIVES, 0)
+    assert [float(line[1:-1]) for line in found] == pytest.approx([1.0 / 25.0, -30.0 / 25.0])
+
+
+@needs("casadi", "casadi")
+def test_functions_of_casadi_give_the_derivatives_of_the_page(capsys):
+    m11, d11, h = 25.0, 30.0, 0.02
+    wanted = f"(19, 19) (19, 15) {1.0 - h * d11 / m11:.3f} {h / m11:.4f}"
+    assert executed(DERIVATIVES, capsys, 1) == [wanted] == answers(DERIVATIVES, 1)
+    assert executed(DERIVATIVES, capsys, 2) == answers(DERIVATIVES, 2)
+    ends = []
+    for eps_t in (0.999, 1.001):
+        values = {"plant.noise.std": 0.0, "controller.eps_t": eps_t}
+        ends.append(simulate("fig4", values, stop_time=2.0)["controller.e.x"][-1])
+    slope = float(answers(DERIVATIVES, 2)[-1].split()[-1])
+    assert slope == pytest.approx((ends[1] - ends[0]) / 0.002, rel=0.01)
+
+
+def answers(page: Path, number: int) -> list[str]:
+    """Output of an example, as the page shows it."""
+    return blocks(page, "text")[number].text.splitlines()
 
 
 def test_solvers_of_other_tools_run_fmus_for_model_exchange(native, capsys):

@@ -79,7 +79,7 @@ def test_both_kinds_are_valid_and_give_the_bits_of_plain_python(fmu, name: str):
 
 
 @each
-def test_derivatives_are_those_of_differences(fmu, tmp_path: Path, name: str):
+def test_derivatives_equal_differences(fmu, tmp_path: Path, name: str):
     check(fmu(name, NATIVE), tmp_path, share=0.4)
 
 

@@ -79,7 +79,7 @@ def jacobian_of(path: Path, folder: Path) -> np.ndarray:
 
 @pytest.mark.parametrize("bundle", ["native", "dist3"])
 @pytest.mark.parametrize("name", components())
-def test_derivatives_are_those_of_differences(request, tmp_path: Path, name: str, bundle: str):
+def test_derivatives_equal_differences(request, tmp_path: Path, name: str, bundle: str):
     check(request.getfixturevalue(bundle) / f"{name}.fmu", tmp_path)
 
 
@@ -139,7 +139,7 @@ def test_at_a_kink_the_branch_of_the_value_counts(made, tmp_path: Path):
         "max(2.0 * y, x)": (0.0, 2.0),
         "x if x > y else 3.0 * y": (0.0, 3.0),
         "abs(x)": (1.0, 0.0),  # by the sign of zero
-        "sqrt(x * x + y * y)": (0.0, 0.0),  # what does not change under the root
+        "sqrt(x * x + y * y)": (0.0, 0.0),  # a constant under the root
     }
     found = jacobian_of(made([*kinks], x=0.0, y=0.0), tmp_path)
     np.testing.assert_array_equal(found, [*kinks.values()])
@@ -151,7 +151,7 @@ def test_an_infinite_derivative_is_discarded(made, tmp_path: Path):
         x, y = it.having("input")
         with pytest.raises(FMICallException, match="status 2"):
             it.jacobian([x])
-        # The instance goes on, and so do derivatives that exist.
+        # The instance continues, with derivatives that exist.
         np.testing.assert_array_equal(it.jacobian([y]), [[0.0], [1.0]])
         assert not it.fmu.getBoolean([it.variables["fault"].valueReference])[0]
 
@@ -194,8 +194,19 @@ def test_arrays_are_serialised(tmp_path: Path):
     np.testing.assert_array_equal(found, np.arange(9.0).reshape(3, 3) @ [1.0, 2.0, 3.0])
 
 
+def test_integers_and_booleans_have_the_derivative_0(native: Path, tmp_path: Path):
+    """OMSimulator asks for everything that an output depends on."""
+    with instance(native / "AuvPlant.fmu", tmp_path) as it:
+        it.begin()
+        seed, fault = it.variables["noise.seed"], it.variables["fault"]
+        assert not it.jacobian([seed, it.variables["roll"]]).any()
+        known = it.having("input")[0].valueReference
+        give = it.fmu.getDirectionalDerivative
+        assert give([fault.valueReference], [known], [1.0]) == [0.0]
+
+
 def test_answers_in_all_modes(native: Path, tmp_path: Path):
-    """Get once more gives the same values: nothing changes."""
+    """A further get gives the same values."""
     with instance(native / "PdController.fmu", tmp_path) as it:
         [known, *_], outputs = it.having("input"), it.having("output")
         with pytest.raises(FMICallException, match="status 3"):
@@ -218,7 +229,7 @@ def test_answers_in_all_modes(native: Path, tmp_path: Path):
         assert give(c_void_p(it.fmu.component), None, n, some, n, (c_double * 1)(1.0), None) == 3
 
 
-def test_equations_with_large_arrays_have_none(tmp_path: Path):
+def test_equations_with_large_arrays_are_not_differentiated(tmp_path: Path):
     """Dual numbers take twice the place, and a thread's stack is small."""
     text = """\
 from typing import Annotated, NamedTuple
@@ -246,7 +257,7 @@ def outputs(inputs: Inputs) -> Outputs:
         assert stated is has
 
 
-def test_other_fmus_say_that_they_have_none(made, tmp_path: Path):
+def test_the_python_kind_refuses(made, tmp_path: Path):
     path = made(["x"], kind=PYTHON)
     with instance(path, tmp_path) as it:
         it.begin()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from ctypes import c_double
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -12,8 +13,8 @@ from typing import Any
 import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave
-from fmpy.fmi3 import FMU3Slave
+from fmpy.fmi2 import FMU2Model, FMU2Slave
+from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 #: Steps of a run before its derivatives are taken, and their size [s].
 STEPS, H = 20, 0.02
@@ -30,8 +31,8 @@ Variable = Any
 class Differentiated:
     """An instance in fmpy, at random values."""
 
-    def __init__(self, path: Path, folder: Path) -> None:
-        """Unpack and instantiate an FMU of FMI 2.0 or 3.0."""
+    def __init__(self, path: Path, folder: Path, exchange: bool = False) -> None:
+        """Unpack and instantiate an FMU of FMI 2.0 or 3.0, perhaps for model exchange."""
         description = fmpy.read_model_description(str(path))
         self.is_fmi3 = description.fmiVersion.startswith("3")
         self.variables = {variable.name: variable for variable in description.modelVariables}
@@ -41,8 +42,11 @@ class Differentiated:
             "modelIdentifier": description.coSimulation.modelIdentifier,
             "instanceName": path.stem,
         }
-        self.fmu: Any = FMU3Slave(**own) if self.is_fmi3 else FMU2Slave(**own)
+        of_fmi2, of_fmi3 = (FMU2Model, FMU3Model) if exchange else (FMU2Slave, FMU3Slave)
+        self.fmu: Any = of_fmi3(**own) if self.is_fmi3 else of_fmi2(**own)
         self.fmu.instantiate()
+        rated = [(v.derivative, v) for v in description.modelVariables if v.derivative]
+        self.states, self.rates = ([pair[k] for pair in rated] for k in (0, 1))
 
     def having(self, *causalities: str, tunable: bool = False) -> list[Variable]:
         """Its floats of some causalities; parameters only if they may change in a run."""
@@ -55,13 +59,23 @@ class Differentiated:
             and (not tunable or variable.variability != "fixed")
         ]
 
+    @property
+    def unknowns(self) -> list[Variable]:
+        """Its outputs, states and rates."""
+        return [*self.having("output"), *self.states, *self.rates]
+
     def get(self, variables: Sequence[Variable]) -> np.ndarray:
         """The values of variables."""
         read = self.fmu.getFloat64 if self.is_fmi3 else self.fmu.getReal
         return np.array(read([variable.valueReference for variable in variables]))
 
     def set(self, variable: Variable, value: float) -> None:
-        """Set a variable."""
+        """Set a variable, or a continuous state."""
+        if variable in self.states:
+            values = self.get(self.states)
+            values[self.states.index(variable)] = value
+            self.fmu.setContinuousStates((c_double * len(values))(*values), len(values))
+            return
         write = self.fmu.setFloat64 if self.is_fmi3 else self.fmu.setReal
         write([variable.valueReference], [value])
 
@@ -80,7 +94,7 @@ class Differentiated:
 
     def jacobian(self, knowns: Sequence[Variable], adjoint: bool = False) -> np.ndarray:
         """Derivatives of all outputs by some variables, as the FMU gives them."""
-        outputs = [variable.valueReference for variable in self.having("output")]
+        outputs = [variable.valueReference for variable in self.unknowns]
         inputs = [variable.valueReference for variable in knowns]
         if adjoint:
             give = self.fmu.getAdjointDerivative
@@ -94,7 +108,7 @@ class Differentiated:
 
     def differences(self, knowns: Sequence[Variable]) -> tuple[np.ndarray, np.ndarray]:
         """The same by central differences of fourth order, and their own errors."""
-        outputs = self.having("output")
+        outputs = self.unknowns
         found = np.full((2, len(outputs), len(knowns)), np.nan)
         for i, variable in enumerate(knowns):
             held = self.get([variable])[0]
@@ -127,43 +141,47 @@ def limits(variable: Variable) -> tuple[float, float]:
     return float(low if low is not None else -np.inf), float(high if high is not None else np.inf)
 
 
-def errors_of(path: Path, folder: Path, seed: int) -> Iterator[tuple[str, np.ndarray]]:
-    """Yield errors at the start and in a run, where differences are smooth; others are NaN."""
-    for place, found, other, rough in jacobians_of(path, folder, seed):
-        scale = 1.0 + np.abs(other)
-        error = np.abs(found - other) / scale
-        error[~(rough / scale < TOLERANCE / 2.0)] = np.nan
-        yield place, error
+def errors_of(it: Differentiated, knowns: Sequence[Variable]) -> np.ndarray:
+    """Errors of derivatives where differences are smooth; others are NaN."""
+    found, (other, rough) = it.jacobian(knowns), it.differences(knowns)
+    scale = 1.0 + np.abs(other)
+    error = np.abs(found - other) / scale
+    error[~(rough / scale < TOLERANCE / 2.0)] = np.nan
+    return error
 
 
-def jacobians_of(
-    path: Path, folder: Path, seed: int
-) -> Iterator[tuple[str, np.ndarray, np.ndarray, np.ndarray]]:
-    """Yield derivatives, differences and their errors: at the start, and in a run."""
+def in_steps(path: Path, folder: Path, seed: int) -> Iterator[np.ndarray]:
+    """Yield errors at the start and in a run of steps."""
     rng = random.Random(seed)
     with instance(path, folder) as it:
         it.begin()
         it.shake(rng, 0.3)
-        yield "start", *compared(it, it.having("input", "parameter"))
+        yield errors_of(it, it.having("input", "parameter"))
         it.fmu.exitInitializationMode()
         for k in range(STEPS):
             it.shake(rng, 0.1)
             it.fmu.doStep(currentCommunicationPoint=k * H, communicationStepSize=H)
         it.shake(rng, 0.1)
-        yield "run", *compared(it, it.having("input", "parameter", tunable=True))
+        yield errors_of(it, it.having("input", "parameter", tunable=True))
 
 
-def compared(
-    it: Differentiated, knowns: Sequence[Variable]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Derivatives, differences, and errors of these."""
-    return it.jacobian(knowns), *it.differences(knowns)
+def in_exchange(path: Path, folder: Path, seed: int) -> Iterator[np.ndarray]:
+    """Yield errors in continuous-time mode, at a random state."""
+    rng = random.Random(seed)
+    with instance(path, folder, exchange=True) as it:
+        it.begin()
+        it.fmu.exitInitializationMode()
+        it.fmu.enterContinuousTimeMode()
+        for state in it.states:
+            it.set(state, it.get([state])[0] + rng.uniform(-0.1, 0.1))
+        it.shake(rng, 0.3)
+        yield errors_of(it, [*it.having("input", "parameter", tunable=True), *it.states])
 
 
 @contextmanager
-def instance(path: Path, folder: Path) -> Iterator[Differentiated]:
+def instance(path: Path, folder: Path, exchange: bool = False) -> Iterator[Differentiated]:
     """An instance that is freed at the end."""
-    it = Differentiated(path, folder)
+    it = Differentiated(path, folder, exchange)
     try:
         yield it
     finally:
@@ -172,8 +190,16 @@ def instance(path: Path, folder: Path) -> Iterator[Differentiated]:
 
 def check(path: Path, folder: Path, share: float = 0.9) -> None:
     """Derivatives equal differences where outputs are smooth, at least in a share of all places."""
-    errors = [error for seed in range(3) for _, error in errors_of(path, folder / str(seed), seed)]
-    all_errors = np.concatenate([error.ravel() for error in errors])
-    smooth = all_errors[np.isfinite(all_errors)]
-    assert len(smooth) >= share * len(all_errors)
+    exchanges = fmpy.read_model_description(str(path)).modelExchange is not None
+    ways = (in_steps, in_exchange) if exchanges else (in_steps,)
+    errors = np.concatenate(
+        [
+            error.ravel()
+            for seed in range(3)
+            for way in ways
+            for error in way(path, folder / f"{way.__name__}{seed}", seed)
+        ]
+    )
+    smooth = errors[np.isfinite(errors)]
+    assert len(smooth) >= share * len(errors)
     assert (smooth < TOLERANCE).all()

@@ -1,7 +1,7 @@
 /* The component: the code between the equations and ports of a model and the functions of FMI.
  *
  * fmi2.c and fmi3.c include this file, each in one translation unit, and define NAMED,
- * FIRST_REFERENCE, `version` and call_logger. A function of FMI is then
+ * FIRST_REFERENCE, HAS_TIME, `version` and call_logger. A function of FMI is then
  *
  *     FUNCTION(fmi2Terminate, MASK_Terminate, NULL, (void *c), terminate(&this))
  *
@@ -26,7 +26,6 @@ typedef struct {
     string types[ENUMERATION + 1]; /* types of values */
     int enumerations_are_integers; /* true if functions for Integers pass them */
     string token;                  /* name of the GUID or token */
-    int has_time;                  /* true if the time is a variable */
 } names;
 
 static const names version;
@@ -121,13 +120,14 @@ typedef struct {
     int fault;
 } run;
 
-/* Derivatives: seeds, and what follows from them. */
+/* Derivatives: seeds, and what follows from them. In initialisation the state follows, too. */
 typedef struct {
     parameter_values parameters;
     input_values inputs;
     state_values state;
     double time;
     output_values outputs;
+    double rates[AT_LEAST_ONE(MODEL_RATES)];
 } directions;
 
 struct instance {

@@ -1,25 +1,36 @@
-/* Directional and adjoint derivatives at a communication point: of what a host would get by what it
- * could set, and by the time.
+/* Directional and adjoint derivatives of outputs, states and rates at one time, by inputs, parameters,
+ * states and the time.
  *
- * In initialisation they go through the initial state; later the state is held.
+ * In initialisation they go through the initial state; later the state is held. Hosts ask for
+ * Integers and Booleans, too: their derivatives are 0.
  */
 #include <math.h>
 #include <string.h>
 
-/* The time is a variable in FMI 3.0, after all others. */
+/* The time is a variable in FMI 3.0, after all ports. */
 static int is_time(uint32_t reference) {
-    return version.has_time && reference == FIRST_REFERENCE + N_PORTS;
+    return HAS_TIME && reference == FIRST_REFERENCE + N_PORTS;
+}
+
+/* Returns the place of a continuous state, or of a rate after all states; -1 for another variable. */
+static int exchanged_place(uint32_t reference) {
+    int place = (int)(reference - FIRST_EXCHANGED);
+    return is_exchanged(reference) && place < 2 * MODEL_RATES ? place : -1;
 }
 
 static int is_unknown(uint32_t reference) {
     const port *port = port_at(reference);
-    return port != NULL && port->causality == OUTPUT && port->type == REAL;
+    return port == NULL ? exchanged_place(reference) >= 0 : port->causality == OUTPUT;
 }
 
-static int is_known(uint32_t reference) {
+/* In initialisation, continuous states follow from the parameters. */
+static int is_known(uint32_t reference, mode mode) {
     const port *port = port_at(reference);
-    return is_time(reference) ||
-           (port != NULL && port->causality != OUTPUT && port->type == REAL);
+    int place = exchanged_place(reference);
+    if (port == NULL) {
+        return is_time(reference) || (mode != INITIALISING && place >= 0 && place < MODEL_RATES);
+    }
+    return port->causality != OUTPUT;
 }
 
 /* Checks references, and brings outputs up to date. */
@@ -34,14 +45,15 @@ static int can_differentiate(call *this, const uint32_t unknowns[], size_t n_unk
     }
     for (size_t i = 0; i < n_unknowns && why.length == 0; i++) {
         if (!is_unknown(unknowns[i])) {
-            compose(&why, "no %s output has the value reference %u", version.types[REAL],
-                    unknowns[i]);
+            compose(&why, "the value reference %u is not of an output, or of a rate", unknowns[i]);
         }
     }
     for (size_t i = 0; i < n_knowns && why.length == 0; i++) {
-        if (!is_known(knowns[i])) {
-            compose(&why, "no %s input or parameter has the value reference %u",
-                    version.types[REAL], knowns[i]);
+        if (!is_known(knowns[i], it->run.mode)) {
+            compose(&why,
+                    "the value reference %u is not of an input, a parameter, or a state that can "
+                    "be set",
+                    knowns[i]);
         }
     }
     if (why.length == 0 && it->run.mode == INSTANTIATED) {
@@ -54,11 +66,14 @@ static int can_differentiate(call *this, const uint32_t unknowns[], size_t n_unk
     return why.length == 0;
 }
 
-/* Sets the seed of an input, a parameter or the time. */
 static void put_seed(directions *along, uint32_t reference, double seed) {
     const port *port = port_at(reference);
-    if (port == NULL) {
+    if (is_time(reference)) {
         along->time += seed;
+    } else if (port == NULL) {
+        along->state.values[continuous[exchanged_place(reference)]] += seed;
+    } else if (port->type != REAL) {
+        return;
     } else if (port->causality == INPUT) {
         along->inputs.values[port->place] += seed;
     } else {
@@ -66,7 +81,16 @@ static void put_seed(directions *along, uint32_t reference, double seed) {
     }
 }
 
-/* Computes the derivatives of all outputs along the seeds; returns 0 if that fails. */
+/* Returns the derivative of an output, a state or a rate. */
+static double slope_of(const directions *along, uint32_t reference) {
+    const port *port = port_at(reference);
+    int place = exchanged_place(reference);
+    if (port != NULL) return port->type == REAL ? along->outputs.values[port->place] : 0.0;
+    return place < MODEL_RATES ? along->state.values[continuous[place]]
+                               : along->rates[place - MODEL_RATES];
+}
+
+/* Computes all derivatives along the seeds; returns 0 if that fails. */
 static int differentiate(call *this) {
     instance *it = this->instance;
     const run *run = &it->run;
@@ -77,7 +101,7 @@ static int differentiate(call *this) {
     model_differentiate(run->mode == INITIALISING, &it->meant.model, &along->parameters.model,
                         &now->state.groups, &along->state.groups, &run->inputs.groups,
                         &along->inputs.groups, now->time, along->time, now->draws,
-                        &along->outputs.groups, &error);
+                        &along->outputs.groups, along->rates, &error);
     if (!error.raised) return 1;
     compose(&why, "derivatives refused: %s", error.why.text);
     refuse(this, FMI_ERROR, &why, NULL);
@@ -108,7 +132,7 @@ static void get_directional(call *this, const uint32_t unknowns[], size_t n_unkn
     k = 0;
     for (size_t i = 0; i < n_unknowns; i++) {
         for (uint32_t e = 0; e < span(unknowns[i]); e++) {
-            sensitivity[k++] = along->outputs.values[port_at(unknowns[i] + e)->place];
+            sensitivity[k++] = slope_of(along, unknowns[i] + e);
         }
     }
     check_slopes(this, sensitivity, k);

@@ -1,7 +1,7 @@
 /* Dual numbers: values, each with its derivative in one direction.
  *
- * Values are computed as in arithmetic.h, bit for bit. Where a function has a kink, the derivative is
- * that of the branch that the value takes, and of a value that does not change it is always 0.
+ * Values are computed as in arithmetic.h, bit for bit. At a kink the branch that the value takes is
+ * differentiated. A constant has the derivative 0, whatever the slope of its function.
  */
 #ifndef DUAL_H
 #define DUAL_H

@@ -6,12 +6,11 @@
  */
 #include <string.h>
 
-enum { EXCHANGES = MODEL_RATES > 0, N_EXCHANGED = 2 * MODEL_RATES + MODEL_SWITCHES };
-
-/* Returns the index of a variable of model exchange; negative for ports and the time. */
-static int place_of_exchanged(uint32_t reference) {
-    return (int)(reference - FIRST_REFERENCE - N_PORTS - (uint32_t)version.has_time);
-}
+enum {
+    EXCHANGES = MODEL_RATES > 0,
+    FIRST_EXCHANGED = FIRST_REFERENCE + N_PORTS + HAS_TIME,
+    N_EXCHANGED = 2 * MODEL_RATES + MODEL_SWITCHES
+};
 
 /* Makes a new instance one for model exchange. */
 static void *for_exchange(void *handle) {
@@ -177,13 +176,13 @@ static void get_nominals(double x[]) {
 }
 
 static int is_exchanged(uint32_t reference) {
-    int place = place_of_exchanged(reference);
+    int place = (int)(reference - FIRST_EXCHANGED);
     return place >= 0 && place < N_EXCHANGED;
 }
 
 static double exchanged(call *this, uint32_t reference) {
     instance *it = this->instance;
-    int place = place_of_exchanged(reference);
+    int place = (int)(reference - FIRST_EXCHANGED);
     if (!has_state(this)) return 0.0;
     if (place < MODEL_RATES) return it->run.moments[it->run.now].state.values[continuous[place]];
     if (!this->rated) {

@@ -10,7 +10,7 @@
 #endif
 
 /* Value references are indices of the variables. */
-enum { FIRST_REFERENCE = 0 };
+enum { FIRST_REFERENCE = 0, HAS_TIME = 0 };
 
 #include "component.c"
 

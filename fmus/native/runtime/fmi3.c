@@ -13,14 +13,13 @@
 #endif
 
 /* Value references are indices of the variables, from 1, since some hosts use them as such. */
-enum { FIRST_REFERENCE = 1 };
+enum { FIRST_REFERENCE = 1, HAS_TIME = 1 };
 
 #include "component.c"
 
 static const names version = {
     .types = {"Float64", "Int32", "Boolean", "Enumeration"},
     .token = "instantiation token",
-    .has_time = 1,
 };
 
 /* fmi3Boolean and fmi3Clock. A host may pass any byte, although a bool is 0 or 1. */
@@ -213,6 +212,45 @@ FUNCTION(fmi3DeserializeFMUState, MASK_FMUstate, NULL,
          (void *c, const uint8_t bytes[], size_t size, void **state),
          deserialise_state(&this, bytes, size, state))
 
+/* Derivatives */
+
+/* One pass for each known: the equations are not run backwards. */
+static void get_adjoint(call *this, const uint32_t unknowns[], size_t n_unknowns,
+                        const uint32_t knowns[], size_t n_knowns, const double seed[],
+                        double sensitivity[]) {
+    directions *along = &this->instance->along;
+    size_t n = 0;
+    if (!can_differentiate(this, unknowns, n_unknowns, knowns, n_knowns)) return;
+    for (size_t i = 0; i < n_knowns; i++) {
+        for (uint32_t e = 0; e < span(knowns[i]); e++) {
+            double sum = 0.0;
+            size_t k = 0;
+            memset(along, 0, sizeof *along);
+            put_seed(along, knowns[i] + e, 1.0);
+            if (!differentiate(this)) return;
+            for (size_t u = 0; u < n_unknowns; u++) {
+                for (uint32_t f = 0; f < span(unknowns[u]); f++) {
+                    sum += seed[k++] * slope_of(along, unknowns[u] + f);
+                }
+            }
+            sensitivity[n++] = sum;
+        }
+    }
+    check_slopes(this, sensitivity, n);
+}
+
+#define DERIVATIVE(name, get, known, n_known, unknown, n_unknown)                                \
+    FUNCTION(name, MASK_Get, NULL,                                                               \
+             (void *c, const uint32_t unknowns[], size_t n_unknowns, const uint32_t knowns[],    \
+              size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],         \
+              size_t n_sensitivity),                                                             \
+             if (check(&this, wrong_numbers(n_knowns, knowns, known, n_known)) &&                \
+                 check(&this, wrong_numbers(n_unknowns, unknowns, unknown, n_unknown)))          \
+                 get(&this, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity))
+
+DERIVATIVE(fmi3GetDirectionalDerivative, get_directional, seed, n_seed, sensitivity, n_sensitivity)
+DERIVATIVE(fmi3GetAdjointDerivative, get_adjoint, sensitivity, n_sensitivity, seed, n_seed)
+
 /* Model exchange */
 
 EXCHANGED(fmi3EnterEventMode, MASK_EnterEventMode, NULL, (void *c), enter_mode(&this, IN_EVENT))
@@ -243,45 +281,6 @@ EXCHANGED(fmi3GetNumberOfContinuousStates, MASK_Get, wrong_place(n), (void *c, s
           *n = MODEL_RATES)
 EXCHANGED(fmi3GetNumberOfEventIndicators, MASK_Get, wrong_place(n), (void *c, size_t *n),
           *n = MODEL_SWITCHES)
-
-/* Derivatives */
-
-/* One pass for each known: the equations are not run backwards. */
-static void get_adjoint(call *this, const uint32_t unknowns[], size_t n_unknowns,
-                        const uint32_t knowns[], size_t n_knowns, const double seed[],
-                        double sensitivity[]) {
-    directions *along = &this->instance->along;
-    size_t n = 0;
-    if (!can_differentiate(this, unknowns, n_unknowns, knowns, n_knowns)) return;
-    for (size_t i = 0; i < n_knowns; i++) {
-        for (uint32_t e = 0; e < span(knowns[i]); e++) {
-            double sum = 0.0;
-            size_t k = 0;
-            memset(along, 0, sizeof *along);
-            put_seed(along, knowns[i] + e, 1.0);
-            if (!differentiate(this)) return;
-            for (size_t u = 0; u < n_unknowns; u++) {
-                for (uint32_t f = 0; f < span(unknowns[u]); f++) {
-                    sum += seed[k++] * along->outputs.values[port_at(unknowns[u] + f)->place];
-                }
-            }
-            sensitivity[n++] = sum;
-        }
-    }
-    check_slopes(this, sensitivity, n);
-}
-
-#define DERIVATIVE(name, get, known, n_known, unknown, n_unknown)                                \
-    FUNCTION(name, MASK_Get, NULL,                                                               \
-             (void *c, const uint32_t unknowns[], size_t n_unknowns, const uint32_t knowns[],    \
-              size_t n_knowns, const double seed[], size_t n_seed, double sensitivity[],         \
-              size_t n_sensitivity),                                                             \
-             if (check(&this, wrong_numbers(n_knowns, knowns, known, n_known)) &&                \
-                 check(&this, wrong_numbers(n_unknowns, unknowns, unknown, n_unknown)))          \
-                 get(&this, unknowns, n_unknowns, knowns, n_knowns, seed, sensitivity))
-
-DERIVATIVE(fmi3GetDirectionalDerivative, get_directional, seed, n_seed, sensitivity, n_sensitivity)
-DERIVATIVE(fmi3GetAdjointDerivative, get_adjoint, sensitivity, n_sensitivity, seed, n_seed)
 
 /* Unsupported functions */
 

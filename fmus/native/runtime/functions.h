@@ -78,7 +78,7 @@ FUNCTION(fmi2DeSerializeFMUstate, MASK_FMUstate, NULL,
          (void *c, const char bytes[], size_t size, void **state),
          deserialise_state(&this, bytes, size, state))
 
-/* Derivatives; the Python kind has none. */
+/* Derivatives, which the Python kind does not give. */
 
 FORWARDED(fmi2GetDirectionalDerivative, MASK_Get, NULL,
           (void *c, const uint32_t u[], size_t nu, const uint32_t k[], size_t nk,

@@ -188,7 +188,9 @@ def corner_ahead(waypoints: Waypoints, corner: Corner, t: float) -> Corner:
         t: time [s].
 
     """
-    while corner.k < waypoints.n and corner.t + waypoints.rounding / 2 <= t:
+    for _ in range(waypoints.n):
+        if not (corner.k < waypoints.n and corner.t + waypoints.rounding / 2 <= t):
+            break
         corner = next_corner(waypoints, corner)
     return corner
 
@@ -224,7 +226,9 @@ def reference(waypoints: Waypoints, corner: Corner, t: float) -> Reference:
     k = corner.k if corner.k < waypoints.n else waypoints.n - 1
     v = velocity(waypoints, corner.k)
     y_d, dy_d, ddy_d = add_scaled(waypoint(waypoints, k), t - corner.t, v), v, _AT_REST
-    while corner.k < waypoints.n and corner.t - T / 2 < t:
+    for _ in range(waypoints.n):
+        if not (corner.k < waypoints.n and corner.t - T / 2 < t):
+            break
         a = (t - corner.t) / T + 0.5
         v_next = velocity(waypoints, corner.k + 1)
         jump = sub(v_next, v)
@@ -248,10 +252,14 @@ def course(waypoints: Waypoints, corner: Corner, dy_d: Vector3) -> Vector3:
 
     """
     k = corner.k
-    while norm(dy_d) == 0.0 and k > 1:
+    for _ in range(waypoints.n):
+        if not (norm(dy_d) == 0.0 and k > 1):
+            break
         k -= 1
         dy_d = velocity(waypoints, k)
-    while norm(dy_d) == 0.0 and k < waypoints.n:
+    for _ in range(waypoints.n):
+        if not (norm(dy_d) == 0.0 and k < waypoints.n):
+            break
         k = k + 1
         dy_d = velocity(waypoints, k)
     return dy_d
