@@ -81,9 +81,11 @@ def search(run, slopes, gains, limit, radius=0.5):
         tried = run(gains + found.x[:-2]).full()[:, 0]
         counts[0] += 1
         gain, promised = (cost(values, limit) - other for other in (cost(tried, limit), found.fun))
-        radius *= 2.0 if gain > 0.1 * promised else 0.25
         if gain > 0.1 * promised:
             gains, values = gains + found.x[:-2], tried
+            radius = min(2.0 * radius, (HIGH - LOW).max())
+        else:
+            radius /= 4.0
         if promised < 0.01 * cost(values, limit):
             break
     return gains, values, counts
