@@ -546,7 +546,7 @@ def _first_line(name: str) -> str:
 
 def differentiated() -> str:
     """Table of the Reals of each component and example."""
-    sources = {f"[{name}](components/{name}.md)": source_of(name) for name in components()}
+    sources = {_linked(name, name, "../.."): source_of(name) for name in components()}
     for path in sorted(EXAMPLES.glob("*/*.py")):
         if path.stem == path.parent.name:
             sources[_link(path.stem)] = source_of_script(script_in(path.parent))

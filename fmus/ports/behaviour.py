@@ -103,7 +103,7 @@ class Behaviour(NamedTuple):
         taken = {*self.arguments(name)}
         if name == "outputs" and "parameters" in self.arguments("measured"):
             taken.add("parameters")
-        if name in ("outputs", "update", "derive"):
+        if name in ("outputs", "update", "derive", "rates"):
             if "derived" in taken:
                 taken |= {*self.arguments("derive")}
             if "state" in taken:

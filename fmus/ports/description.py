@@ -80,22 +80,29 @@ def document(root: Element) -> bytes:
 
 
 class Local(NamedTuple):
-    """Numbers of the variables of model exchange."""
+    """Numbers of the variables of model exchange, and of those that they depend on."""
 
     states: list[int]
     rates: list[int]
     switches: list[int]
+    known: list[int]  #: variables that rates may depend on
+    initial: list[int]  #: variables that states and rates may depend on at the start
 
 
 def local_in(ports: Sequence[Port], numbers: Iterable[int] | None = None) -> Local:
     """Return the numbers of local variables; ports are numbered as for `dependencies`."""
-    numbered = [*zip(ports, numbers or count(1))]
     states = {port.derivative for port in ports}
-    found = Local([], [], [])
-    for port, number in numbered:
+    takes_time = any(port.derivative and port.feedthrough for port in ports)
+    found = Local([], [], [], [], [])
+    for port, number in zip(ports, numbers or count(1)):
         if port.causality == "local":
             kind = found.states if port.name in states else found.switches
             (found.rates if port.derivative else kind).append(number)
+        is_known = port.causality == "input" or (port == TIME and takes_time)
+        if is_known or port.name in states:
+            found.known.append(number)
+        if is_known or port.causality == "parameter":
+            found.initial.append(number)
     return found
 
 
@@ -296,19 +303,16 @@ def _add_type(parent: Element, kind: str, name: str, **attributes: str) -> Eleme
 
 
 def _structure(ports: Sequence[Port]) -> list[Element]:
-    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too.
-
-    Rates, and at the start continuous states, may depend on everything.
-    """
+    """Write Outputs with direct feedthrough, and InitialUnknowns with parameters, too."""
     outputs, initial_unknowns = Element("Outputs"), Element("InitialUnknowns")
     derivatives, local = Element("Derivatives"), local_in(ports)
     for output in dependencies(ports):
         for parent, known in ((outputs, output.direct), (initial_unknowns, output.initial)):
             SubElement(parent, "Unknown", _dependent_on(known), index=str(output.number))
     for number in local.rates:
-        SubElement(derivatives, "Unknown", index=str(number))
+        SubElement(derivatives, "Unknown", _dependent_on(local.known), index=str(number))
     for number in (*local.states, *local.rates):
-        SubElement(initial_unknowns, "Unknown", index=str(number))
+        SubElement(initial_unknowns, "Unknown", _dependent_on(local.initial), index=str(number))
     return [outputs, *([derivatives] if local.rates else []), initial_unknowns]
 
 
@@ -444,11 +448,11 @@ def _structure_3(variables: Sequence[_Variable]) -> Element:
     for output in outputs:
         add("Output", output.number, output.direct)
     for number in local.rates:
-        add("ContinuousStateDerivative", number)
+        add("ContinuousStateDerivative", number, local.known)
     for output in outputs:
         add("InitialUnknown", output.number, output.initial)
     for number in (*local.states, *local.rates):
-        add("InitialUnknown", number)
+        add("InitialUnknown", number, local.initial)
     for number in local.switches:
         add("EventIndicator", number)
     return structure

@@ -10,7 +10,7 @@ from typing import Any
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.fields import declared
 from fmus.ports.groups import count_values, fields_of
-from fmus.ports.port import Port
+from fmus.ports.port import TIME, Port
 from fmus.ports.units import rate_of
 
 
@@ -26,6 +26,7 @@ def exchanged(behaviour: Behaviour) -> tuple[Port, ...]:
             description=f"Rate of {state.name}",
             unit=rate_of(state.unit or "") or None,
             derivative=state.name,
+            feedthrough=(TIME.name,) if behaviour.takes("rates", "t") else (),
         )
         for state in states
     ]

@@ -371,6 +371,25 @@ def test_a_saved_state_continues_in_the_same_way(built, tmp_path: Path, fmi: str
             assert "for model exchange" in stepping.messages[-1].text
 
 
+@pytest.mark.parametrize("fmi", FMI_VERSIONS)
+def test_states_may_be_set_by_their_references(built, tmp_path: Path, fmi: str):
+    """As CasADi does; all values of a call or none."""
+    load = Fmi3Library if fmi == "3" else Library
+    library = load(Path(fmpy.extract(str(built("AuvPlant", fmi)), tmp_path)))
+    names = ("state.position.x", "state.nu_r.u", "der(state.nu_r.u)", "tau.u")
+    x, u, du, tau = (library.description.find(name).reference for name in names)
+    with reached(library, "in continuous-time mode") as host:
+        assert host.set("Real", [x, u, tau], [5.0, 2.0, 7.0]) == Status.OK
+        assert host.get("Real", [x, u, tau]) == (Status.OK, [5.0, 2.0, 7.0])
+        # (7 - 30 * 2) / 25
+        assert host.get("Real", [du])[1] == pytest.approx([-2.12])
+        assert host.set("Real", [u, x], [3.0, nan]) == Status.Discard
+        assert host.get("Real", [x, u]) == (Status.OK, [5.0, 2.0])
+        assert host.set("Real", [du], [1.0]) == Status.Error
+    with instance(library) as stepping:
+        assert stepping.set("Real", [u], [3.0]) == Status.Error
+
+
 def test_rates_that_cannot_be_computed_raise_no_fault(built, tmp_path: Path):
     library = Library(Path(fmpy.extract(str(built("Remus100", "2")), tmp_path)))
     with reached(library, "in continuous-time mode") as host:

@@ -148,6 +148,7 @@ struct instance {
     /* Values that a call sets, until all are checked. */
     parameter_values set_parameters;
     input_values set_inputs;
+    state_values set_state;
     directions along; /* for derivatives */
 };
 

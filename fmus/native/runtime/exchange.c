@@ -194,3 +194,18 @@ static double exchanged(call *this, uint32_t reference) {
     place -= MODEL_RATES;
     return place < MODEL_RATES ? it->rates[place] : it->switches[place - MODEL_RATES];
 }
+
+/* Some hosts set states by their references. */
+static int is_settable_state(const instance *it, uint32_t reference) {
+    int place = (int)(reference - FIRST_EXCHANGED);
+    return it->exchanges && WHEN(it->run.mode) & EXCHANGING && place >= 0 && place < MODEL_RATES;
+}
+
+static void set_state_value(instance *it, uint32_t reference, double number) {
+    it->set_state.values[continuous[reference - FIRST_EXCHANGED]] = number;
+}
+
+static void take_states(instance *it) {
+    it->run.moments[it->run.now].state = it->set_state;
+    note_state(it);
+}

@@ -18,6 +18,13 @@ static int refresh(instance *it, message *why);
 static int is_exchanged(uint32_t reference);
 static double exchanged(call *this, uint32_t reference);
 
+/* True for a continuous state that the host may set; sets it after all values are checked. */
+static int is_settable_state(const instance *it, uint32_t reference);
+static void set_state_value(instance *it, uint32_t reference, double number);
+
+/* Makes the states that were set the present ones. */
+static void take_states(instance *it);
+
 /* Ports */
 
 static const char NO_PORT[] = "no %s has the value reference %u";
@@ -182,7 +189,7 @@ typedef struct {
     call *call;
     int good;
     int has_parameters;
-    int changes_inputs, changes_parameters;
+    int changes_inputs, changes_parameters, changes_states;
 } setting;
 
 static void set_unknown(call *this, string type, const uint32_t references[], size_t n) {
@@ -194,11 +201,13 @@ static void set_unknown(call *this, string type, const uint32_t references[], si
 
 static setting begin_setting(call *this, fmi_type type, const uint32_t references[], size_t n) {
     instance *instance = this->instance;
-    setting it = {this, 1, 0, 0, 0};
+    setting it = {this, 1, 0, 0, 0, 0};
     for (size_t i = 0; i < n && it.good; i++) {
         const port *port = port_at(references[i]);
         if (port != NULL && passes_as(port, type)) {
             it.has_parameters |= port->causality == PARAMETER;
+        } else if (type == REAL && is_settable_state(instance, references[i])) {
+            it.changes_states = 1;
         } else {
             set_unknown(this, version.types[type], &references[i], 1);
             it.good = 0;
@@ -206,6 +215,7 @@ static setting begin_setting(call *this, fmi_type type, const uint32_t reference
     }
     if (it.has_parameters) instance->set_parameters = instance->run.parameters;
     instance->set_inputs = instance->run.inputs;
+    if (it.changes_states) instance->set_state = instance->run.moments[instance->run.now].state;
     return it;
 }
 
@@ -238,6 +248,15 @@ static void set_value(setting *it, uint32_t reference, double number) {
     const port *port = port_at(reference);
     message why;
     if (!it->good) return;
+    if (port == NULL) {
+        if (isfinite(number)) {
+            set_state_value(instance, reference, number);
+        } else {
+            compose(&why, "continuous states must be finite");
+            refuse_setting(it, &why);
+        }
+        return;
+    }
     if (!check_settable(&instance->run, port, number, &why)) {
         it->good = 0;
         fail(it->call, &why);
@@ -266,6 +285,7 @@ static void end_setting(setting *it) {
     }
     if (it->changes_parameters) run->parameters = instance->set_parameters;
     run->inputs = instance->set_inputs;
+    if (it->changes_states) take_states(instance);
     note_change(instance, it->changes_inputs, it->changes_parameters);
 }
 
