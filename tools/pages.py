@@ -38,7 +38,6 @@ from fmus.documentation import component_page
 from fmus.language.mathematics import CONSTANTS, FUNCTIONS
 from fmus.ports.definition import Definition
 from fmus.ports.description import local_in
-from fmus.script import script_in, source_of_script
 from orchestrator.commands.main import COMMANDS, parser
 from orchestrator.figures.run_figures import FIGURES, FLEET
 from orchestrator.figures.study_values import Values
@@ -46,6 +45,7 @@ from orchestrator.figures.style import printed_unit
 from orchestrator.machine.schema import TomlTable, entries
 from orchestrator.machine.texts import flatten
 from orchestrator.paper.page import table
+from orchestrator.program.components import definition_in
 from orchestrator.runs.scenario import Scenario, names, read_scenario
 from orchestrator.runs.scenario_file import (
     CompareTable,
@@ -546,12 +546,12 @@ def _first_line(name: str) -> str:
 
 def differentiated() -> str:
     """Table of the Reals of each component and example."""
-    sources = {_linked(name, name, "../.."): source_of(name) for name in components()}
+    found = {_linked(name, name, "../.."): source_of(name).definition for name in components()}
     for path in sorted(EXAMPLES.glob("*/*.py")):
         if path.stem == path.parent.name:
-            sources[_link(path.stem)] = source_of_script(script_in(path.parent))
+            found[_link(path.stem)] = definition_in(path)
     head = ("component", "outputs", "inputs", "parameters", "states", "event indicators")
-    return table(head, [(link, *_reals(source.definition)) for link, source in sources.items()])
+    return table(head, [(link, *_reals(definition)) for link, definition in found.items()])
 
 
 def _reals(definition: Definition) -> Iterator[str]:

@@ -24,6 +24,7 @@ from orchestrator.cosim import Experiment
 from orchestrator.machine.compilers import TARGETS, machines_compiler
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.result import read_result
+from support.examples import EXAMPLES
 from support.markdown import DOCS, blocks
 from support.patches import patch
 from support.replay import compile_replay, replay
@@ -87,8 +88,9 @@ def followed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     before = [*sys.path]
     with pytest.MonkeyPatch.context() as here, redirect_stdout(output):
         here.chdir(folder)
-        # An example has that name, too.
+        # An example has that name, too, and other tests import it.
         here.delitem(sys.modules, "pid", raising=False)
+        here.setattr(sys, "path", [p for p in sys.path if EXAMPLES not in Path(p).parents])
         for language, text in blocks(PAGE, "sh", "diff", "python"):
             if language == "diff":
                 patch(folder, text)

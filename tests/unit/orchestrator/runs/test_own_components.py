@@ -132,9 +132,9 @@ def test_command_shows_the_next_steps(tmp_path, monkeypatch, capsys):
 def test_command_tells_how_to_install_pytest(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("orchestrator.commands.build.find_spec", lambda name: None)
-    assert main(["new", "component", "pid"]) == 0
+    assert main(["new", "component", "my_pid"]) == 0
     out = capsys.readouterr().out
-    assert "  pip install pytest\n  pytest pid/test_pid.py\n" in out
+    assert "  pip install pytest\n  pytest my_pid/test_my_pid.py\n" in out
 
 
 @pytest.mark.parametrize(
