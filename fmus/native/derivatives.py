@@ -115,8 +115,13 @@ def derivatives(definition: Definition) -> str | None:
     lines.append(passages["outputs"].put("doutputs", "model_slopes_of_outputs(y)"))
     if "rates" in hooks:
         type_ = hooks["rates"].returns
-        lines.append(f"const {dual.type(type_)} dx = {calls['rates']};")
-        lines += moves(type_, "dx", range(count(type_)), "drates[{place}] = {member}.d;")
+        moved = moves(type_, "dx", range(count(type_)), "drates[{place}] = {member}.d;")
+        lines += [
+            "if (drates != NULL) {",
+            f"    const {dual.type(type_)} dx = {calls['rates']};",
+            *(f"    {line}" for line in moved),
+            "}",
+        ]
     given_back = {"outputs": hooks["outputs"].returns}
     if "start" in hooks:
         given_back["state"] = groups["state"]

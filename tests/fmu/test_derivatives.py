@@ -194,6 +194,17 @@ def test_arrays_are_serialised(tmp_path: Path):
     np.testing.assert_array_equal(found, np.arange(9.0).reshape(3, 3) @ [1.0, 2.0, 3.0])
 
 
+def test_rates_that_are_refused_leave_the_outputs_their_derivatives(native: Path, tmp_path: Path):
+    """The actuators of Remus100 have no rates without time constants."""
+    with instance(native / "Remus100.fmu", tmp_path) as it:
+        it.set(it.variables["fin.T"], 0.0)
+        it.begin()
+        give, known = it.fmu.getDirectionalDerivative, it.variables["eta0.x"].valueReference
+        assert give([it.variables["eta.x"].valueReference], [known], [1.0]) == [1.0]
+        with pytest.raises(FMICallException, match="status 3"):
+            give([it.rates[0].valueReference], [known], [1.0])
+
+
 def test_integers_and_booleans_have_the_derivative_0(native: Path, tmp_path: Path):
     """OMSimulator asks for everything that an output depends on."""
     with instance(native / "AuvPlant.fmu", tmp_path) as it:

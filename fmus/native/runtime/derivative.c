@@ -90,8 +90,17 @@ static double slope_of(const directions *along, uint32_t reference) {
                                : along->rates[place - MODEL_RATES];
 }
 
-/* Computes all derivatives along the seeds; returns 0 if that fails. */
-static int differentiate(call *this) {
+/* Rates may be refused where outputs are not. */
+static int has_rate(const uint32_t unknowns[], size_t n) {
+    for (size_t i = 0; i < n; i++) {
+        if (exchanged_place(unknowns[i]) >= MODEL_RATES) return 1;
+    }
+    return 0;
+}
+
+/* Computes the derivatives of outputs, and perhaps of rates, along the seeds; returns 0 if that
+ * fails. */
+static int differentiate(call *this, int with_rates) {
     instance *it = this->instance;
     const run *run = &it->run;
     const moment *now = &run->moments[run->now];
@@ -101,7 +110,7 @@ static int differentiate(call *this) {
     model_differentiate(run->mode == INITIALISING, &it->meant.model, &along->parameters.model,
                         &now->state.groups, &along->state.groups, &run->inputs.groups,
                         &along->inputs.groups, now->time, along->time, now->draws,
-                        &along->outputs.groups, along->rates, &error);
+                        &along->outputs.groups, with_rates ? along->rates : NULL, &error);
     if (!error.raised) return 1;
     compose(&why, "derivatives refused: %s", error.why.text);
     refuse(this, FMI_ERROR, &why, NULL);
@@ -128,7 +137,7 @@ static void get_directional(call *this, const uint32_t unknowns[], size_t n_unkn
     for (size_t i = 0; i < n_knowns; i++) {
         for (uint32_t e = 0; e < span(knowns[i]); e++) put_seed(along, knowns[i] + e, seed[k++]);
     }
-    if (!differentiate(this)) return;
+    if (!differentiate(this, has_rate(unknowns, n_unknowns))) return;
     k = 0;
     for (size_t i = 0; i < n_unknowns; i++) {
         for (uint32_t e = 0; e < span(unknowns[i]); e++) {

@@ -227,7 +227,7 @@ static void get_adjoint(call *this, const uint32_t unknowns[], size_t n_unknowns
             size_t k = 0;
             memset(along, 0, sizeof *along);
             put_seed(along, knowns[i] + e, 1.0);
-            if (!differentiate(this)) return;
+            if (!differentiate(this, has_rate(unknowns, n_unknowns))) return;
             for (size_t u = 0; u < n_unknowns; u++) {
                 for (uint32_t f = 0; f < span(unknowns[u]); f++) {
                     sum += seed[k++] * slope_of(along, unknowns[u] + f);
