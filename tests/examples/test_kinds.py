@@ -13,7 +13,7 @@ from fmpy.util import read_csv
 from fmpy.validation import validate_fmu
 
 from fmus.discovery import REFERENCE
-from fmus.kinds import KINDS, NATIVE
+from fmus.kinds import FMI_VERSIONS, KINDS, NATIVE
 from fmus.ports.port import FAULT
 from fmus.trial import run
 from orchestrator.commands.main import main
@@ -79,8 +79,9 @@ def test_both_kinds_are_valid_and_give_the_bits_of_plain_python(fmu, name: str):
 
 
 @each
-def test_derivatives_equal_differences(fmu, tmp_path: Path, name: str):
-    check(fmu(name, NATIVE), tmp_path, share=0.4)
+@pytest.mark.parametrize("fmi", FMI_VERSIONS)
+def test_derivatives_equal_differences(fmu, tmp_path: Path, name: str, fmi: str):
+    check(fmu(name, NATIVE, fmi), tmp_path, share=0.4)
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from collections.abc import Callable
 from ctypes import c_double, c_size_t, c_uint, c_void_p
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
+from auv_fmu import casadi
 from fmus.discovery import components
 from fmus.kinds import NATIVE, PYTHON
 from fmus.language.mathematics import FUNCTIONS
@@ -81,6 +83,32 @@ def jacobian_of(path: Path, folder: Path) -> np.ndarray:
 @pytest.mark.parametrize("name", components())
 def test_derivatives_equal_differences(request, tmp_path: Path, name: str, bundle: str):
     check(request.getfixturevalue(bundle) / f"{name}.fmu", tmp_path)
+
+
+@pytest.mark.parametrize(
+    "name", [name for name in components() if name not in ("AcousticLink", "Sea")]
+)
+def test_derivatives_equal_those_of_casadi(native: Path, tmp_path: Path, name: str):
+    """Another differentiation of the same text, at the start."""
+    ca = pytest.importorskip("casadi")
+    made = casadi.model(name)
+    u, p = ca.SX.sym("u", len(made.inputs)), ca.SX.sym("p", len(made.parameters))
+    y = made.observe(made.start(u, p, 0.0), u, p, 0.0)
+    both = ca.Function("both", [u, p], [ca.jacobian(y, ca.vertcat(u, p))])
+    with instance(native / f"{name}.fmu", tmp_path) as it:
+        it.begin()
+        it.shake(random.Random(1), 0.3)
+        inputs, parameters, outputs = (
+            [it.variables[port] for port in ports]
+            for ports in (made.inputs, made.parameters, made.outputs)
+        )
+        known = [*inputs, *parameters]
+        wanted = both(it.get(inputs), it.get(parameters)).full()
+        rows = [it.unknowns.index(output) for output in outputs]
+        # CasADi has no noise, which its standard deviation changes.
+        columns = [i for i, variable in enumerate(known) if variable.name != "noise.std"]
+        found = it.jacobian(known)[rows]
+    np.testing.assert_allclose(found[:, columns], wanted[:, columns], rtol=1e-10, atol=1e-13)
 
 
 def test_derivatives_of_ports_and_states_of_all_types(tmp_path: Path):
