@@ -31,7 +31,7 @@ KEPT = np.exp(-STEP / 10.0)
 ADDED = np.diag(np.append(np.zeros(12), FIRST[12:] ** 2 * (1.0 - KEPT**2)))
 
 PLANT = model("AuvPlant", free=[])
-END, DY = PLANT.state.index("tau[1]"), PLANT.outputs.index("dy.x")
+END, DY = PLANT.state.index("state.tau.u"), PLANT.outputs.index("dy.x")
 
 
 def tangent(x, scale=0.5):

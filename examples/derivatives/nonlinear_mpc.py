@@ -27,7 +27,8 @@ MOVES, HOLD, MOVE = 15, 10, 0.2
 LIMIT, WEIGHT, CHANGE, SHARE = 80.0, 0.01, 0.075, 0.2
 
 PLANT = model("AuvPlant", {"integrator": "rk4"}, free=["eta0", "nu0"])
-NU, END, Y = PLANT.state.index("nu_r[1]"), PLANT.state.index("tau[1]"), PLANT.outputs.index("y.x")
+NU, END = PLANT.state.index("state.nu_r.u"), PLANT.state.index("state.tau.u")
+Y = PLANT.outputs.index("y.x")
 
 
 def functions():

@@ -108,7 +108,9 @@ def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner:
     """Return the Variable of a field, with its members; refuse an invalid one."""
     variables = [note for note in notes if isinstance(note, Variable)]
     if not variables and causality == "local":
-        variables = [Variable("", place[-1])]
+        # Only a float may have a unit.
+        unit = "" if _shape(inner, notes, place)[1] is float else "1"
+        variables = [Variable(unit, place[-1])]
     if len(variables) != 1:
         example = f'{place[-1]}: Annotated[{_word(inner)}, Variable("m", "What it is")]'
         raise _wrong(place, f"has no unit and no description; write {example}")

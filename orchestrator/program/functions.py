@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import repeat
+from itertools import chain, repeat
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +17,7 @@ from fmus.language.build import Program, Untranslatable
 from fmus.language.symbols import Evaluator, Value, filled, numbers_in
 from fmus.language.types import Array, Record, Type, count, type_of
 from fmus.ports.definition import Definition
+from fmus.ports.fields import declared
 from fmus.ports.port import H_MAX, Misdeclared, Port
 from fmus.script import message_of, script_in
 from orchestrator.cosim import Connection, Linear, PortName, Stage, System, Visit
@@ -52,7 +53,7 @@ class Model:
 
     Attributes:
         name: name of the component or the system.
-        state: names of the numbers in the state.
+        state: names of the numbers in the state, as variables of model exchange have them.
         inputs: names of the inputs.
         parameters: names of the parameters that are arguments; the others are fixed.
         outputs: names of the outputs.
@@ -145,7 +146,7 @@ class _Component:
             [port.name for port in definition.parameters.ports if port.type == "Real"], free
         )
         self.vectors: dict[str, list[Any]] = {
-            "state": [*_names(self._equations.types["state"])],
+            "state": self._equations.names,
             "inputs": [port.name for port in ports["input"]],
             "parameters": self._free,
             "outputs": [port.name for port in ports["output"]],
@@ -239,7 +240,7 @@ class _System:
         states = [
             f"{name}.{path}"
             for name, equations in self._equations.items()
-            for path in _names(equations.types["state"])
+            for path in equations.names
         ]
         self.vectors: dict[str, list[Any]] = {
             "state": [*states, *map(str, self._held)],
@@ -494,6 +495,7 @@ class Equations:
 
     Attributes:
         types: types of the groups that hooks take.
+        names: names of the numbers in the state.
         is_sampled: True if the outputs after a step are those of its beginning.
 
     """
@@ -516,6 +518,7 @@ class Equations:
             "inputs": type_of(self._behaviour.inputs),
             "state": type_of(self._behaviour.state),
         }
+        self.names = _names_in(self._behaviour.state)
         self.is_sampled = self._behaviour.is_sampled
 
     def given(self, parameters: Mapping[str, Value], inputs: Iterable[Value]) -> dict[str, Value]:
@@ -662,11 +665,21 @@ def _number(value: Any) -> float:
     return float(value or 0.0)
 
 
-def _names(type_: Type, name: str = "") -> Iterator[str]:
-    """Yield the paths of the numbers in a type: `nu[1]`, `filter.x`."""
+def _names_in(state: Any) -> list[str]:
+    """Return the names of the numbers in a state: `state.nu_r.u`, `state.P[1,2]`."""
+    try:
+        ports = [*chain(*declared(state, "local", prefix="state.").values())]
+    except Misdeclared:
+        # A tuple of several types, which ports cannot be.
+        return [*_paths(type_of(state), "state")]
+    return [port.name for port in ports]
+
+
+def _paths(type_: Type, name: str) -> Iterator[str]:
+    """Yield the paths of the numbers in a type."""
     if isinstance(type_, Record):
         for field_, part in type_.fields:
-            yield from _names(part, f"{name}.{field_}" if name else field_)
+            yield from _paths(part, f"{name}.{field_}")
     elif isinstance(type_, Array):
         inner: Type = type_
         indices = [""]
@@ -674,7 +687,7 @@ def _names(type_: Type, name: str = "") -> Iterator[str]:
             indices = [f"{i},{k}" if i else f"{k}" for i in indices for k in range(1, inner.n + 1)]
             inner = inner.item
         for index in indices:
-            yield from _names(inner, f"{name}[{index}]")
+            yield from _paths(inner, f"{name}[{index}]")
     else:
         yield name
 

@@ -88,7 +88,7 @@ def test_derivatives_equal_differences(request, tmp_path: Path, name: str, bundl
 @pytest.mark.parametrize(
     "name", [name for name in components() if name not in ("AcousticLink", "Sea")]
 )
-def test_derivatives_equal_those_of_casadi(native: Path, tmp_path: Path, name: str):
+def test_derivatives_equal_casadis(native: Path, tmp_path: Path, name: str):
     """Another differentiation of the same text, at the start."""
     ca = pytest.importorskip("casadi")
     made = casadi.model(name)

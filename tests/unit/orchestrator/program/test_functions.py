@@ -252,7 +252,7 @@ def test_rates_are_what_the_hook_gives(name):
     found = made.rates(_row(known["state"]), made.default_inputs, made.default_parameters, 0.0)
     rates = dict(zip(made.state, found.full().ravel(), strict=True))
     fields = {
-        field: [rate for path, rate in rates.items() if re.split(r"[.\[]", path)[0] == field]
+        field: [rate for path, rate in rates.items() if re.split(r"[.\[]", path)[1] == field]
         for field in behaviour.state._fields
     }
     for field, values in fields.items():
