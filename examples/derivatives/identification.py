@@ -99,12 +99,12 @@ if __name__ == "__main__":
     theta, sigma = fits(measured, slopes, found.x)
     covered = (np.abs(theta - TRUTH) < HALF * sigma).sum(axis=0)
     known = np.array([*map(told, COMMANDS.values())]).T
-    print("                     estimate         truth   covered   known after commands in")
-    print(" " * 45, *(f"{name:>9}" for name in COMMANDS))
+    print(f"{'':14} {'estimate':>12} {'truth':>6} {'covered':>7}  known after commands in")
+    print(" " * 42, *(f"{name.replace(', ', '+'):>7}" for name in COMMANDS))
     for k, half in enumerate(HALF * deviations(found.jac)):
-        shares = (f"{share:9.1%}" if share < 0.99 else f"{'-':>9}" for share in known[k])
-        estimate = f"{found.x[k]:7.2f} ± {half:4.2f}"
-        print(f"{NAMES[k]:14} {estimate} {TRUTH[k]:13.1f} {covered[k]:7} %", *shares)
+        shares = (f"{share:7.1%}" if share < 0.99 else f"{'-':>7}" for share in known[k])
+        estimate = f"{found.x[k]:5.2f} ± {half:4.2f}"
+        print(f"{NAMES[k]:14} {estimate} {TRUTH[k]:6.1f} {covered[k]:5} %", *shares)
     away = (np.abs(other.x - found.x) / deviations(found.jac)).max()
     print(f"exact derivatives: {found.nfev} rounds, {seconds:.2f} s")
     print(f"differences: {other.nfev} rounds, {longer:.2f} s, away by {away:.0e} deviations")
