@@ -27,7 +27,7 @@ H, STEPS = 0.1, 400
 NOISE = np.repeat([0.1, np.radians(1.0)], 3)
 IS_HIGH = [H * np.arange(STEPS) % period < 0.5 * period for period in (16.0, 10.0, 7.0)]
 TAU = np.where(IS_HIGH, [[40.0], [3.0], [5.0]], [[10.0], [-3.0], [-5.0]])
-COMMANDS = {"u": (1, 0, 0), "u, q": (1, 1, 0), "u, r": (1, 0, 1), "u, q, r": (1, 1, 1)}
+COMMANDS = {"u": (1, 0, 0), "u+q": (1, 1, 0), "u+r": (1, 0, 1), "u+q+r": (1, 1, 1)}
 
 #: Half an interval of 95 %, in standard deviations.
 HALF = 1.96
@@ -100,7 +100,7 @@ if __name__ == "__main__":
     covered = (np.abs(theta - TRUTH) < HALF * sigma).sum(axis=0)
     known = np.array([*map(told, COMMANDS.values())]).T
     print(f"{'':14} {'estimate':>12} {'truth':>6} {'covered':>7}  known after commands in")
-    print(" " * 42, *(f"{name.replace(', ', '+'):>7}" for name in COMMANDS))
+    print(" " * 42, *(f"{name:>7}" for name in COMMANDS))
     for k, half in enumerate(HALF * deviations(found.jac)):
         shares = (f"{share:7.1%}" if share < 0.99 else f"{'-':>7}" for share in known[k])
         estimate = f"{found.x[k]:5.2f} ± {half:4.2f}"
