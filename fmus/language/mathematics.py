@@ -30,7 +30,8 @@ class Function(NamedTuple):
         is_rounded: True if the last bit depends on the library, so that a compiler must not
             evaluate it.
         factor: the function is a product with this factor; 0 for other functions.
-        slopes: partial derivatives by the arguments x and y, in C, where z is the result; none: 0.
+        slopes: partial derivatives by the arguments x and y, in C, where z is the result; one that
+            is missing is 0.
 
     """
 
@@ -51,9 +52,7 @@ FUNCTIONS: Mapping[str, Function] = {
     "atan2": Function(2, slopes=("y / (x * x + y * y)", "-x / (x * x + y * y)")),
     "atanh": Function(raises="x <= -1.0 || x >= 1.0", slopes=("1.0 / ((1.0 - x) * (1.0 + x))",)),
     "ceil": Function(result=INT, is_rounded=False),
-    "copysign": Function(
-        2, is_rounded=False, slopes=("copysign(1.0, x) * copysign(1.0, y)", "0.0")
-    ),
+    "copysign": Function(2, is_rounded=False, slopes=("copysign(1.0, x) * copysign(1.0, y)",)),
     "cos": Function(raises="isinf(x)", slopes=("-sin(x)",)),
     "cosh": Function(raises=RANGE, slopes=("sinh(x)",)),
     "degrees": Function(factor=math.degrees(1.0)),

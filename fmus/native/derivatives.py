@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 
 from fmus.language import tree
@@ -10,28 +10,20 @@ from fmus.language.build import Program
 from fmus.language.tree import Function
 from fmus.language.types import Scalar, Type, count, type_of
 from fmus.native.dual import DualEmitter
-from fmus.native.emit import Emitter, lines_of
+from fmus.native.emit import Emitter
 from fmus.native.names import in_c
 from fmus.native.pieces import function, initializer, moves
-from fmus.native.translator import MOST_ON_STACK, deepest, translation
+from fmus.native.translator import MOST_ON_STACK, deepest, runtime_function, translation
 from fmus.ports.behaviour import Behaviour
 from fmus.ports.definition import Definition
 
-_ARGUMENTS = {
-    "starts": "int starts",
-    "parameters": "const model_parameters *parameters",
-    "dparameters": "const model_parameters *dparameters",
-    "state": "const model_state *state",
-    "dstate": "model_state *dstate",
-    "inputs": "const model_inputs *inputs",
-    "dinputs": "const model_inputs *dinputs",
-    "t": "double t",
-    "dt": "double dt",
-    "draws": "const double draws[]",
-    "doutputs": "model_outputs *doutputs",
-    "drates": "double drates[]",
-    "error": "Error *error",
-}  # fmt: skip
+#: Arguments of the function for the runtime.
+_ARGUMENTS = (
+    "int starts, const model_parameters *parameters, const model_parameters *dparameters, "
+    "const model_state *state, model_state *dstate, const model_inputs *inputs, "
+    "const model_inputs *dinputs, double t, double dt, const double draws[], "
+    "model_outputs *doutputs, double drates[], Error *error"
+)
 
 _HEAD = """\
 /* Derivatives of outputs and rates: the functions of equations.c for dual numbers. */
@@ -39,15 +31,14 @@ _HEAD = """\
 
 enum {{ MODEL_DIFFERENTIABLE = {} }};"""
 
-_DIFFERENTIATE = "\n".join(
-    lines_of(f"static void model_differentiate({', '.join(_ARGUMENTS.values())})", "")
-)
-
 
 def derivatives_of_nothing() -> str:
     """Return the file derivatives.c of a model without derivatives."""
-    nothing = function(_DIFFERENTIATE, [], [*_ARGUMENTS])
-    return "\n\n".join([_HEAD.format(0), nothing]) + "\n"
+    return "\n\n".join([_HEAD.format(0), _differentiate([])]) + "\n"
+
+
+def _differentiate(body: Sequence[str]) -> str:
+    return runtime_function("void", "differentiate", _ARGUMENTS, body)
 
 
 @cache
@@ -128,7 +119,7 @@ def derivatives(definition: Definition) -> str | None:
     parts = [
         *(_joined(emitter, dual, name, groups[name]) for name in groups if name in taken),
         *(_slopes(emitter, dual, name, type_) for name, type_ in given_back.items()),
-        function(_DIFFERENTIATE, lines, [*_ARGUMENTS]),
+        _differentiate(lines),
     ]
     return "\n\n".join([_HEAD.format(1), dual.text(), *parts]) + "\n"
 

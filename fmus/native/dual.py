@@ -48,9 +48,7 @@ class DualEmitter(Emitter):
         names = ("x", "y")[: about.arguments]
         value = call(f"math_{name}" if about.raises else name, names, bool(about.raises))
         parts = [
-            f"dual_chain({slope}, d{argument}.d)"
-            for argument, slope in zip(names, about.slopes)
-            if slope != "0.0"
+            f"dual_chain({slope}, d{argument}.d)" for argument, slope in zip(names, about.slopes)
         ]
         given = [f"Dual d{argument}" for argument in names] + ["Error *error"] * bool(about.raises)
         head = f"static inline {self.real} dual_{name}({', '.join(given)})"

@@ -298,12 +298,13 @@ def _measured(
 def defined(bodies: Mapping[str, Sequence[str]]) -> list[str]:
     """Write the functions for the runtime with their bodies."""
     return [
-        _defined(returns, name, arguments, bodies.get(name) or idle)
+        runtime_function(returns, name, arguments, bodies.get(name) or idle)
         for name, (returns, arguments, idle) in _CALLED.items()
     ]
 
 
-def _defined(returns: str, name: str, arguments: str, body: Sequence[str]) -> str:
+def runtime_function(returns: str, name: str, arguments: str, body: Sequence[str]) -> str:
+    """Write a function for the runtime; unused arguments are cast to void."""
     names = re.findall(r"(\w+)(?:\[\])?(?=,|$)", arguments)
     head = lines_of(f"static {returns} model_{name}({arguments})", "")
     return function("\n".join(head), body, names)

@@ -55,9 +55,7 @@ def parquet() -> Any:
         InputError: it is not installed.
 
     """
-    if find_spec("pyarrow") is None:
-        raise InputError("Parquet needs pyarrow: pip install 'auv-fmu[parquet]'")
-    return import_module("pyarrow.parquet")
+    return _extra("pyarrow.parquet", "Parquet needs", "parquet")
 
 
 def casadi() -> Any:
@@ -67,6 +65,12 @@ def casadi() -> Any:
         InputError: it is not installed.
 
     """
-    if find_spec("casadi") is None:
-        raise InputError("functions of CasADi need casadi: pip install 'auv-fmu[casadi]'")
-    return import_module("casadi")
+    return _extra("casadi", "functions of CasADi need", "casadi")
+
+
+def _extra(module: str, needs: str, extra: str) -> Any:
+    """Return a module of a package that an extra brings."""
+    package = module.partition(".")[0]
+    if find_spec(package) is None:
+        raise InputError(f"{needs} {package}: pip install 'auv-fmu[{extra}]'")
+    return import_module(module)

@@ -18,13 +18,13 @@ from fmus.language.symbols import Evaluator, Value, filled, numbers_in
 from fmus.language.types import Array, Record, Type, count, type_of
 from fmus.ports.definition import Definition
 from fmus.ports.fields import declared
-from fmus.ports.port import H_MAX, Misdeclared, Port
+from fmus.ports.port import H_MAX, Misdeclared
 from fmus.script import message_of, script_in
 from orchestrator.cosim import Connection, Linear, PortName, Stage, System, Visit
 from orchestrator.machine.errors import InputError, did_you_mean
 from orchestrator.machine.lazy import casadi
 from orchestrator.program.components import definition_in, definitions_of, refusals
-from orchestrator.program.writer import start_of, straight
+from orchestrator.program.writer import start_of, straight, typed
 from orchestrator.runs.preparation import Prepared, is_path, prepare_options
 from orchestrator.runs.request import SystemOptions
 from orchestrator.runs.scenario import names as scenario_names
@@ -608,7 +608,7 @@ def settled(definition: Definition, given: Mapping[str, object]) -> dict[str, An
 
     """
     ports = {port.name: port for port in definition.parameters.ports}
-    values = {name: _typed(port, port.start) for name, port in ports.items()}
+    values = {name: typed(port, port.start or 0) for name, port in ports.items()}
     for name, value in given.items():
         if name == H_MAX:
             raise InputError(f"{name}: a step of a function is one internal step, however long")
@@ -621,7 +621,7 @@ def settled(definition: Definition, given: Mapping[str, object]) -> dict[str, An
                 raise InputError(f"{name} = {value!r:.20}: use one of {known}")
             value = int(port.choices[value])
         try:
-            values[name] = _typed(port, port.checked(value))  # type: ignore[arg-type]
+            values[name] = typed(port, port.checked(value))  # type: ignore[arg-type]
         except Refusal as error:
             raise InputError(str(error)) from None
     if check := definition.behaviour.hooks["check"]:
@@ -654,11 +654,6 @@ def chosen(names: Sequence[str], free: Free) -> list[str]:
         for name in names
         if any(name == group or name.startswith(starts) for group, starts in groups.items())
     ]
-
-
-def _typed(port: Port, value: Any) -> Any:
-    """Return a value in the type of the equations."""
-    return {"Real": float, "Boolean": bool}.get(port.type, int)(value)
 
 
 def _number(value: Any) -> float:

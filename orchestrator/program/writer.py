@@ -550,6 +550,11 @@ def start_of(system: System, name: PortName, port: Port) -> float | int | bool:
         value = int(system.variable(name).items[value])
     if value is None:
         value = port.start or 0
+    return typed(port, value)
+
+
+def typed(port: Port, value: float) -> float | int | bool:
+    """Return a value in the type that the equations take."""
     types: dict[str, type[float | int | bool]] = {"Real": float, "Boolean": bool}
     return types.get(port.type, int)(value)
 

@@ -12,25 +12,17 @@ static int is_time(uint32_t reference) {
     return HAS_TIME && reference == FIRST_REFERENCE + N_PORTS;
 }
 
-/* Returns the place of a continuous state, or of a rate after all states; -1 for another variable. */
-static int exchanged_place(uint32_t reference) {
-    int place = (int)(reference - FIRST_EXCHANGED);
-    return is_exchanged(reference) && place < 2 * MODEL_RATES ? place : -1;
-}
-
 static int is_unknown(uint32_t reference) {
     const port *port = port_at(reference);
-    return port == NULL ? exchanged_place(reference) >= 0 : port->causality == OUTPUT;
+    if (port == NULL) return is_continuous_state(reference) || is_rate(reference);
+    return port->causality == OUTPUT;
 }
 
 /* In initialisation, continuous states follow from the parameters. */
 static int is_known(uint32_t reference, mode mode) {
     const port *port = port_at(reference);
-    int place = exchanged_place(reference);
-    if (port == NULL) {
-        return is_time(reference) || (mode != INITIALISING && place >= 0 && place < MODEL_RATES);
-    }
-    return port->causality != OUTPUT;
+    if (port != NULL) return port->causality != OUTPUT;
+    return is_time(reference) || (mode != INITIALISING && is_continuous_state(reference));
 }
 
 /* Checks references, and brings outputs up to date. */
@@ -93,7 +85,7 @@ static double slope_of(const directions *along, uint32_t reference) {
 /* Rates may be refused where outputs are not. */
 static int has_rate(const uint32_t unknowns[], size_t n) {
     for (size_t i = 0; i < n; i++) {
-        if (exchanged_place(unknowns[i]) >= MODEL_RATES) return 1;
+        if (is_rate(unknowns[i])) return 1;
     }
     return 0;
 }

@@ -75,15 +75,12 @@ static void note_state(instance *it) {
 
 static void set_time(call *this, double time) {
     instance *it = this->instance;
-    moment *now = &it->run.moments[it->run.now];
     message why;
-    if (!isfinite(time)) {
+    if (isfinite(time)) {
+        pass_to(it, &it->run.moments[it->run.now], time);
+    } else {
         compose(&why, "time %r: must be finite", time);
         fail(this, &why);
-    } else if (now->time != time) {
-        now->time = time;
-        if (MODEL_OUTPUTS_TAKE_TIME) now->outputs_are = OUTDATED;
-        if (MODEL_DERIVE_TAKES_TIME) it->underived = 1;
     }
 }
 
@@ -175,14 +172,27 @@ static void get_nominals(double x[]) {
     for (int i = 0; i < MODEL_RATES; i++) x[i] = 1.0;
 }
 
-static int is_exchanged(uint32_t reference) {
+/* Returns the place of a variable of model exchange; -1 for another variable. */
+static int exchanged_place(uint32_t reference) {
     int place = (int)(reference - FIRST_EXCHANGED);
-    return place >= 0 && place < N_EXCHANGED;
+    return place >= 0 && place < N_EXCHANGED ? place : -1;
+}
+
+static int is_exchanged(uint32_t reference) { return exchanged_place(reference) >= 0; }
+
+static int is_continuous_state(uint32_t reference) {
+    int place = exchanged_place(reference);
+    return place >= 0 && place < MODEL_RATES;
+}
+
+static int is_rate(uint32_t reference) {
+    int place = exchanged_place(reference);
+    return place >= MODEL_RATES && place < 2 * MODEL_RATES;
 }
 
 static double exchanged(call *this, uint32_t reference) {
     instance *it = this->instance;
-    int place = (int)(reference - FIRST_EXCHANGED);
+    int place = exchanged_place(reference);
     if (!has_state(this)) return 0.0;
     if (place < MODEL_RATES) return it->run.moments[it->run.now].state.values[continuous[place]];
     if (!this->rated) {
@@ -197,12 +207,11 @@ static double exchanged(call *this, uint32_t reference) {
 
 /* Some hosts set states by their references. */
 static int is_settable_state(const instance *it, uint32_t reference) {
-    int place = (int)(reference - FIRST_EXCHANGED);
-    return it->exchanges && WHEN(it->run.mode) & EXCHANGING && place >= 0 && place < MODEL_RATES;
+    return it->exchanges && WHEN(it->run.mode) & EXCHANGING && is_continuous_state(reference);
 }
 
 static void set_state_value(instance *it, uint32_t reference, double number) {
-    it->set_state.values[continuous[reference - FIRST_EXCHANGED]] = number;
+    it->set_state.values[continuous[exchanged_place(reference)]] = number;
 }
 
 static void take_states(instance *it) {

@@ -215,6 +215,14 @@ static inline void copy_for(generator *copy, const generator *it, uint32_t n) {
     if (it->place + 2 * (n + 1) > GENERATOR_WORDS) memcpy(copy->words, it->words, sizeof it->words);
 }
 
+/* Changes the time of a moment, and marks what depends on it as outdated. */
+static inline void pass_to(instance *it, moment *of, double time) {
+    if (of->time == time) return;
+    of->time = time;
+    if (MODEL_OUTPUTS_TAKE_TIME) of->outputs_are = OUTDATED;
+    if (MODEL_DERIVE_TAKES_TIME) it->underived = 1;
+}
+
 /* Computes the next moment, and makes it the present one if all its values are valid. */
 static int advance(instance *it, double time, double step, message *why) {
     run *run = &it->run;
@@ -231,11 +239,7 @@ static int advance(instance *it, double time, double step, message *why) {
         if (n <= 0) return n == 0;
     }
     *next = run->moments[run->now];
-    if (next->time != time) {
-        next->time = time;
-        if (MODEL_OUTPUTS_TAKE_TIME) next->outputs_are = OUTDATED;
-        if (MODEL_DERIVE_TAKES_TIME) it->underived = 1;
-    }
+    pass_to(it, next, time);
     if (MODEL_SAMPLED && next->outputs_are != FRESH) {
         if (!evaluate(it, next, why)) return 0;
         shown = !shown;

@@ -13,7 +13,7 @@ from typing import Annotated, NamedTuple
 from auv_fmu.language.arrays import Matrix
 from auv_fmu.language.quantities import POSITION
 from auv_fmu.language.variable import POSITIVE, Variable
-from auv_fmu.language.vectors import Vector3, Vector6, add
+from auv_fmu.language.vectors import Vector3, Vector6, add, cross
 
 #: Mass of the water that a spheroid of 1.6 m by 0.19 m displaces [kg].
 DISPLACED = round(4.0 / 3.0 * pi * 1026.0 * 0.8 * 0.095 * 0.095, 12)
@@ -135,11 +135,6 @@ def inertia(hull: Hull) -> Inertia:
         )
     )
     return Inertia(i_x, i_y, a_11, a_22, a_44, a_55, M)
-
-
-def cross(a: Vector3, b: Vector3) -> Vector3:
-    """Vector product of a and b."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 def coriolis(hull: Hull, mass: Inertia, nu_r: Vector6) -> Vector6:
