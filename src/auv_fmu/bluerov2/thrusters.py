@@ -152,13 +152,10 @@ def forces(layout: Layout, thrusts: Annotated[Vector, COUNT]) -> Vector6:
 
     """
     X, Y, Z, K, M, N = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(COUNT):
-        x, y, z = layout.x[k], layout.y[k], layout.z[k]
-        f_x, f_y, f_z = (
-            layout.e_x[k] * thrusts[k],
-            layout.e_y[k] * thrusts[k],
-            layout.e_z[k] * thrusts[k],
-        )
+    for x, y, z, e_x, e_y, e_z, f in zip(
+        layout.x, layout.y, layout.z, layout.e_x, layout.e_y, layout.e_z, thrusts
+    ):
+        f_x, f_y, f_z = e_x * f, e_y * f, e_z * f
         X, Y, Z = X + f_x, Y + f_y, Z + f_z
         K, M, N = K + (y * f_z - z * f_y), M + (z * f_x - x * f_z), N + (x * f_y - y * f_x)
     return X, Y, Z, K, M, N
