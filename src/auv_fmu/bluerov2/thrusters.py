@@ -2,8 +2,8 @@
 
 The curve is a fit to what Blue Robotics measured of a T200 at 16 V and at rest ("T200 Public
 Performance Data 10-20 V", September 2019): of 201 points the largest error is 1.9 N, at full
-command, and the root of the mean square 0.34 N. Positions and directions are those of von Benzon et
-al. (2022), doi:10.3390/jmse10121898. Not in the paper.
+command, and the root of the mean square 0.34 N. Positions and directions are from von Benzon et al.
+(2022), doi:10.3390/jmse10121898. Not in the paper.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from auv_fmu.paper.actuators import limit
 
 #: Source of the model, and the paper of the equation numbers.
 __citation__ = (
-    "The model is that of M. von Benzon et al., An Open-Source Benchmark Simulator: Control of a "
+    "The model is from M. von Benzon et al., An Open-Source Benchmark Simulator: Control of a "
     f"BlueROV2 Underwater Robot, JMSE 10(12):1898, 2022. {of_the_paper}"
 )
 
@@ -108,7 +108,7 @@ class Layout(NamedTuple):
 
 
 def thrust(curve: Curve, command: float) -> float:
-    """Steady thrust of a command [N]; beyond -1 .. 1 that of the limit.
+    """Steady thrust of a command [N], which is limited to -1 .. 1.
 
     Args:
         curve: of the thruster.

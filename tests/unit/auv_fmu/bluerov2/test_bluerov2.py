@@ -53,9 +53,7 @@ def steps(parameters, state, command, water, dwater, h, n):
     phi=angles, theta=st.floats(-1.5, 1.5), psi=angles, nu=velocities, tau=wrenches, tau_w=wrenches,
     water=streams, dwater=streams,
 )  # fmt: skip
-def test_accelerations_are_those_of_fossens_matrices(
-    phi, theta, psi, nu, tau, tau_w, water, dwater
-):
+def test_accelerations_follow_from_fossens_matrices(phi, theta, psi, nu, tau, tau_w, water, dwater):
     """Over ground, in moving water: the body's momentum is over ground, the added one is not."""
     rotation = rotation_from_euler(phi, theta, psi)
     nu_r = over_ground(nu, rotation, tuple(-w for w in water))
@@ -81,8 +79,8 @@ MANOEUVRES = {
 
 
 @pytest.mark.parametrize("name", MANOEUVRES)
-def test_open_loop_responses_are_those_of_another_integrator(name):
-    """Posture within 1 mm (mrad) in steps of 0.5 ms, within 5 cm (mrad) in those of 20 ms.
+def test_open_loop_responses_agree_with_another_integrator(name):
+    """Posture within 1 mm (mrad) in steps of 0.5 ms, within 5 cm (50 mrad) in steps of 20 ms.
 
     Euler's scheme is of first order: steps that are half as long halve the error.
     """
@@ -186,7 +184,7 @@ def test_accelerating_water_pushes_a_light_vehicle_further_than_itself():
 
 
 def test_a_vertical_vehicle_has_an_attitude_like_any_other():
-    """A pitch of 90 degrees is no pole, and the vehicle comes back from it."""
+    """A pitch of 90 degrees is not a pole, and the vehicle comes back from it."""
     nose_up = Parameters(eta0=(0.0, 0.0, 0.0, 0.0, np.pi / 2.0, 0.0))
     state = steps(nose_up, begin(nose_up, NONE_3), IDLE, NONE_3, NONE_3, 0.02, 3000)
     euler = euler_from_rotation(rotation_from_quaternion(state.quaternion))
@@ -208,7 +206,7 @@ def test_thrust_follows_with_its_time_constant_and_the_step_has_its_mean():
     nu=velocities, thrusts=st.tuples(*(st.floats(-39.0, 50.0),) * 8), water=streams, dwater=streams,
     phi=angles, theta=st.floats(-1.4, 1.4),
 )  # fmt: skip
-def test_rates_are_those_of_small_steps(nu, thrusts, water, dwater, phi, theta):
+def test_rates_agree_with_small_steps(nu, thrusts, water, dwater, phi, theta):
     """For solvers of their own, in water that moves, and whose velocity has jumped."""
     state = begin(PARAMETERS, NONE_3)._replace(
         quaternion=quaternion_from_euler(phi, theta, 0.3), nu_r=nu, thrust=Vector(thrusts)

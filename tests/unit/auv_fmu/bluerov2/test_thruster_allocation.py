@@ -39,7 +39,7 @@ def test_the_pseudo_inverse_is_numpys():
 
 
 @given(tau=st.tuples(forces, forces, forces, moments, moments, moments))
-def test_what_is_wanted_is_attained_or_all_of_it_is_scaled_to_the_limits(tau):
+def test_a_wanted_force_is_attained_or_scaled_to_the_limits(tau):
     """The largest multiple, at most one, whose thrusts by numpy are within the limits."""
     found = evaluate(PARAMETERS, P, wanted(tau))
     thrusts = np.linalg.pinv(oracle.effect()) @ tau
@@ -50,7 +50,7 @@ def test_what_is_wanted_is_attained_or_all_of_it_is_scaled_to_the_limits(tau):
     assert np.abs(found.command).max() <= 1.0 + 1e-12
 
 
-def test_the_largest_force_ahead_is_that_of_two_thrusters_astern_and_two_ahead():
+def test_the_largest_force_ahead_takes_two_thrusters_ahead_and_two_astern():
     """The pitch that it makes below the centre of mass takes the vertical thrusters."""
     found = evaluate(PARAMETERS, P, wanted((1e6, 0.0, 0.0, 0.0, 0.0, 0.0)))
     most = 4.0 * np.sqrt(0.5) * -SMALLEST

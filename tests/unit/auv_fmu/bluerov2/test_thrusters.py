@@ -61,7 +61,7 @@ def test_a_curve_may_be_a_line():
 
 
 @given(thrusts=st.lists(st.floats(-50.0, 50.0), min_size=8, max_size=8))
-def test_forces_are_those_of_the_published_positions_and_directions(thrusts):
+def test_forces_follow_from_the_published_positions_and_directions(thrusts):
     given_ = forces(LAYOUT, Vector(thrusts))
     assert given_ == pytest.approx(oracle.effect() @ thrusts, rel=1e-9, abs=1e-9)
 
