@@ -61,6 +61,10 @@ CASES = {
         "command.n": 100.0, "command.delta_r": 0.1, "command.delta_s": -0.05, "nu0.u": 1.0,
         "current.y": 0.2, "dwater.x": 0.01,
     }),
+    "BlueRov2Heavy": Case(5.0, {
+        "command[1]": 0.4, "command[2]": 0.3, "command[3]": -0.3, "command[4]": -0.4,
+        "command[6]": 0.2, "command[7]": -0.1, "nu0.p": 0.3, "current.y": 0.2, "dwater.x": 0.01,
+    }),
     "dc_motor": Case(2.0, {"load": 0.05}),
     "van_der_pol": Case(10.0, {"mu": 2.0}),
     "dahlquist": Case(5.0),
@@ -239,6 +243,7 @@ def test_a_tank_stays_full_at_its_rim(built):
         ("AuvPlant", "tau.u", 80.0, "switch.tau.u"),
         ("AuvPlant", "tau.r", -80.0, "switch.tau.r"),
         ("Remus100", "command.delta_r", np.deg2rad(15.0), "switch.command.delta_r"),
+        ("BlueRov2Heavy", "command[3]", -1.0, "switch.limit[3]"),
     ],
 )
 def test_an_indicator_changes_its_sign_at_a_limit(

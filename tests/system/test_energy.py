@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_fmu.bluerov2 import bluerov2
 from auv_fmu.paper import plant
 from auv_fmu.paper.attitude import rotation_from_euler, rotation_from_quaternion
 from auv_fmu.paper.plant import Integrator, Parameters, RollAxis
@@ -167,3 +168,47 @@ def test_remus_100_with_idle_actuators_only_loses_energy(velocity, rates, phi, t
     scale = 1.0 + nu @ M @ nu
     assert nu @ M @ dnu - work_of_righting <= 1e-9 * scale
     assert abs(np.dot(nu, hull.coriolis(vehicle.hull, mass, tuple(nu)))) <= 1e-9 * scale**1.5
+
+
+# The BlueROV2 Heavy
+
+
+@given(
+    velocity=vectors(st.floats(-2.0, 2.0), 3),
+    rates=vectors(st.floats(-5.0, 5.0), 3),
+    phi=st.floats(-3.0, 3.0),
+    theta=st.floats(-1.5, 1.5),
+)
+def test_bluerov2_without_thrust_only_loses_energy(velocity, rates, phi, theta):
+    """d/dt (nu' M nu / 2) less the work of weight and buoyancy is the work of the drag."""
+    vehicle, nu = bluerov2.Parameters(), np.array((*velocity, *rates))
+    body, added = vehicle.body, vehicle.hydrodynamics.added
+    M = np.array((body.mass,) * 3 + body.inertia) + added
+    rotation = rotation_from_euler(phi, theta, 0.0)
+    down = np.array(rotation) @ (0.0, 0.0, body.gravity)
+    dnu = bluerov2.accelerations(vehicle, tuple(nu), rotation, NONE_6, NONE_6, NONE_3)
+    buoyancy = -body.rho * body.volume * down
+    at_centre = nu[:3] + np.cross(nu[3:], body.r_b)
+    weighing = body.mass * down @ nu[:3] + buoyancy @ at_centre
+    lost = nu @ (M * dnu) - weighing
+    drag = vehicle.hydrodynamics.linear + vehicle.hydrodynamics.quadratic * np.abs(nu)
+    scale = 1.0 + nu @ (M * nu)
+    assert lost <= 1e-9 * scale**1.5
+    assert lost == pytest.approx(-nu @ (drag * nu), abs=1e-9 * scale**1.5)
+
+
+def test_bluerov2_without_thrust_loses_energy_along_a_run():
+    """A tumble in small steps: kinetic energy, and that of weight and buoyancy, never grow."""
+    body = bluerov2.Body(volume=0.0135)
+    nu0 = (1.0, -0.5, 0.3, 4.0, -3.0, 5.0)
+    vehicle = bluerov2.Parameters(body=body, nu0=nu0)
+    M = np.array((body.mass,) * 3 + body.inertia) + vehicle.hydrodynamics.added
+    state, h, before = bluerov2.begin(vehicle, NONE_3), 5e-4, np.inf
+    for _ in range(4000):
+        rotation = rotation_from_quaternion(state.quaternion)
+        upright = body.mass * body.gravity * -body.r_b[2] * (1.0 - rotation[2][2])
+        now = np.dot(M * state.nu_r, state.nu_r) / 2.0 + upright
+        assert now <= before + 1e-9
+        before = now
+        state = bluerov2.advance(vehicle, state, rotation, state.thrust, NONE_6, NONE_3, NONE_3, h)
+    assert now < 1.0

@@ -136,6 +136,34 @@ REMUS_100 = {
     "allocation.Parameters": {"speed": 1.5, "measured": False},
 }
 
+#: Numbers of von Benzon et al. (2022), the fit of the T200's curve, and parameters that they lack.
+BLUEROV2 = {
+    "Body": {
+        "mass": 13.5, "inertia": (0.26, 0.23, 0.37), "volume": 0.0134, "rho": 1000.0,
+        "gravity": 9.82, "r_b": (0.0, 0.0, -0.01),
+    },
+    "Hydrodynamics": {
+        "added": (6.36, 7.12, 18.68, 0.189, 0.135, 0.222),
+        "linear": (13.7, 0.0, 33.0, 0.0, 0.8, 0.0),
+        "quadratic": (141.0, 217.0, 190.0, 1.19, 0.47, 1.5),
+    },
+    "Curve": {
+        "dead_band": 0.07, "forward": 28.2, "forward_square": 31.3, "reverse": 22.9,
+        "reverse_square": 23.4,
+    },
+    "Layout": {
+        "x": (0.156, 0.156, -0.156, -0.156, 0.12, 0.12, -0.12, -0.12),
+        "y": (0.111, -0.111, 0.111, -0.111, 0.218, -0.218, 0.218, -0.218),
+        "z": (0.085,) * 4 + (0.0,) * 4,
+        "e_x": pytest.approx((0.5**0.5, 0.5**0.5, -(0.5**0.5), -(0.5**0.5), 0, 0, 0, 0)),
+        "e_y": pytest.approx((-(0.5**0.5), 0.5**0.5, -(0.5**0.5), 0.5**0.5, 0, 0, 0, 0)),
+        "e_z": (0.0,) * 4 + (-1.0,) * 4,
+    },
+    "bluerov2.Parameters": {
+        "T": 0.029, "ell": 0.35, "eta0": ZERO_6, "nu0": ZERO_6, "current": ZERO_3,
+    },
+}  # fmt: skip
+
 
 def name_of(kind: type) -> str:
     """Its name, with its module's where several have it."""
@@ -159,7 +187,12 @@ def test_defaults_are_the_papers_or_named_as_ours(name):
         for field, value in SETS[name]._field_defaults.items()
         if name_of(type(value)) not in SETS
     }
-    assert plain == {**SECTION_4_1.get(name, {}), **OURS.get(name, {}), **REMUS_100.get(name, {})}
+    assert plain == {
+        **SECTION_4_1.get(name, {}),
+        **OURS.get(name, {}),
+        **REMUS_100.get(name, {}),
+        **BLUEROV2.get(name, {}),
+    }
 
 
 def nested(value):
