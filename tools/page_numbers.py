@@ -801,7 +801,7 @@ def models() -> None:
 def show_turns(name: str, balance: Callable[[Sequence[float], float], np.ndarray]) -> None:
     """Print steady turns, by forces in sway and yaw for a velocity and an angle of the rudder."""
     for most, speed in product((15.0, 20.0), (1.06, 1.5)):
-        v, r = steady_turn(speed, lambda nu, most=most: balance(nu, radians(most)))
+        v, r = steady_turn(speed, partial(lambda angle, nu: balance(nu, angle), radians(most)))
         print(f"  turn of {name} with {most:g} degrees of rudder at {speed:g} m/s: {r:.3f} rad/s, "
               f"radius {speed / r:.1f} m, sway {v:.3f} m/s")  # fmt: skip
 
