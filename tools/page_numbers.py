@@ -597,6 +597,7 @@ CHANGES: Mapping[str, Values] = {
     "gamma = 3": {"controller.gamma": 3.0},
     "no noise": QUIET,
     "no noise, fin of 0.03 s": {**QUIET, "plant.fin.T": 0.03},
+    "fins up to 20 degrees": {f"{name}.fin.max": radians(20.0) for name in ("plant", "allocation")},
     "k_d = 50": {"controller.k_d": 50.0},
     "noise of 3 mm": {STD: 0.003},
     "noise of 1 cm": {STD: 0.01},
