@@ -690,6 +690,10 @@ def turning(vehicle: remus100.Parameters, nu: Sequence[float], rudder: float) ->
     return force(vehicle, nu, 0.0, rudder, 0.0)[[1, 5]]
 
 
+#: Hull of remus100.m.
+MSS_HULL = Hull(length=1.0096 * 1.6, diameter=1.0096 * 0.19, mass=31.9)
+
+
 def mss_force(nu: Sequence[float], rudder: float) -> np.ndarray:
     """Force and moment in sway and yaw of remus100.m of the MSS toolbox (6d4b553).
 
@@ -697,8 +701,7 @@ def mss_force(nu: Sequence[float], rudder: float) -> np.ndarray:
     these turns.
     """
     u, v, _, _, _, r = nu
-    hull = Hull(length=1.0096 * 1.6, diameter=1.0096 * 0.19, mass=31.9)
-    M = inertia(hull).M
+    hull, M = MSS_HULL, inertia(MSS_HULL).M
     reynolds = abs(v) * 1.6e6
     c_d = float(np.interp(
         reynolds,
@@ -793,6 +796,9 @@ def models() -> None:
             enough = (x for x in np.arange(1.5, 0.3, -0.01) if trim(floats, x)[1] < -15.0)
             print(f"  B - W = {net:g} N: pitch {theta:.1f}, stern planes {planes:.1f} degrees at "
                   f"1.5 m/s; more than 15 degrees at {next(enough, 0.0):.2f} m/s")  # fmt: skip
+    M, moment = inertia(MSS_HULL).M, mss_force([1.5, *[0.0] * 5], radians(15.0))[1]
+    print(f"\nMSS: sway {M[1, 1]:.3g} kg, yaw {M[5, 5]:.3g} kg.m2; moments of 15 degrees at "
+          f"1.5 m/s {moment:.2f}, {0.7 / 0.5 * moment:.2f} N.m")  # fmt: skip
     show_turns("MSS", mss_force)
     for scenario, moments in (("remus", (2.25, 1.61)), ("remus-prestero", (3.62, 3.62))):
         corner = largest_corner(scenario, moments)

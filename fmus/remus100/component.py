@@ -84,7 +84,7 @@ def check(parameters: Parameters) -> None:
         if not 0.0 < weight + hull.net_buoyancy <= largest:
             raise Refusal(
                 f"net_buoyancy = {hull.net_buoyancy:g} and a weight of {weight:g} N: the buoyancy "
-                f"must be above 0 and at most {largest:g} N, that of a cylinder around the hull"
+                f"must be above 0 and at most {largest:g} N, which a cylinder around the hull has"
             )
     M = remus100.inertia_of(parameters).M
     for k in range(6):

@@ -68,9 +68,7 @@ class Coefficients(NamedTuple):
 
 
 def inertia(coefficients: Coefficients, hull: Hull) -> Inertia:
-    """Mass and moments of inertia; of the added mass, only what is in the mass matrix.
-
-    What the added mass does beside is in the coefficients.
+    """Mass matrix with added mass; the other effects of added mass are in the coefficients.
 
     Args:
         coefficients: of the hull.

@@ -40,7 +40,7 @@ class Form(IntEnum):
     """Form of the inertia and the forces of the hull."""
 
     SPHEROID = 0  #: Lamb's factors, lift, drag and cross-flow, as in PythonVehicleSimulator
-    COEFFICIENTS = 1  #: those of Prestero
+    COEFFICIENTS = 1  #: products of velocities, as in Prestero's thesis
 
 
 #: Module-level name, which Python looks up faster than a member of the class.
