@@ -31,14 +31,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import date
+from functools import partial
 from itertools import pairwise, product
-from math import ceil, exp, log
+from math import ceil, cos, exp, log, radians, sin
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from scipy.optimize import root
 
 from auv_fmu.bluerov2 import bluerov2, thruster_allocation
 from auv_fmu.bluerov2.thruster_allocation import Wanted, effect, pseudo_inverse
@@ -48,12 +50,15 @@ from auv_fmu.paper import motion_planner, plant
 from auv_fmu.paper.attitude import normalised, rotation_from_quaternion
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.output_feedback import ControllerState
-from auv_fmu.remus.hull import inertia
-from auv_fmu.remus.remus100 import Parameters, RemusState, accelerations, tail_forces
+from auv_fmu.remus import remus100
+from auv_fmu.remus.hull import Drag, Hull, cross_flow, inertia
+from auv_fmu.remus.remus100 import Form, RemusState, accelerations, inertia_of
+from auv_fmu.remus.tail import Tail
 from fmus.ports.port import H_MAX
 from orchestrator import simulate
 from orchestrator.cosim import PortName, System, Table
 from orchestrator.machine.compilers import ROUNDED
+from orchestrator.machine.errors import InputError
 from orchestrator.machine.workers import cores
 from orchestrator.paper.claims import total_variation_until
 from orchestrator.paper.page import numbers, table
@@ -495,6 +500,7 @@ SPANS: Mapping[str, Sequence[tuple[float, float]]] = {
     "formation-lost-link": [(25, 121), (100, 121)],
     "remus": [(120, 281)],
     "bluerov": [(0, 20), (20, 50), (65, 71)],
+    "remus-prestero": [(50, 281)],
 }
 
 #: Runs without randomness.
@@ -595,6 +601,7 @@ CHANGES: Mapping[str, Values] = {
     "gamma = 3": {"controller.gamma": 3.0},
     "no noise": QUIET,
     "no noise, fin of 0.03 s": {**QUIET, "plant.fin.T": 0.03},
+    "fins up to 20 degrees": {f"{name}.fin.max": radians(20.0) for name in ("plant", "allocation")},
     "k_d = 50": {"controller.k_d": 50.0},
     "noise of 3 mm": {STD: 0.003},
     "noise of 1 cm": {STD: 0.01},
@@ -610,35 +617,38 @@ def remus() -> None:
 
     Its columns are the largest error in the first 40 s and from 120 s on [m], the largest part of
     the latter across the path [m], the share of steps with a fin at its limit, in pitch and yaw
-    [%], the largest command in yaw [N.m], and the mean rate of the rudder [degrees/s].
+    [%], the largest command in yaw [N.m], and the mean rate of the rudder [degrees/s]. Then the
+    models: masses, steady turns, trims and corners.
     """
     heading = f"{'first':>6}{'late':>6}{'across':>6}{'q':>4}{'r':>4}{'yaw':>7}{'rate':>6}"
     print(f"{'changed':42}{heading}  |{heading}")
-    for name, changes in CHANGES.items():
+    prestero = {
+        str(name): value
+        for name, value in read_scenario("remus-prestero").parameters.items()
+        if name.component != "controller" and "waypoint" not in name.port
+    }
+    for name, changes in {**CHANGES, "Prestero's coefficients": prestero}.items():
         lacking = ("controller.K2", "controller.k_d")
         shared = {key: value for key, value in changes.items() if key not in lacking}
         lines = remus_numbers("remus", changes), remus_numbers("remus-pd", shared)
         print(f"{name:42}{'  |'.join(lines)}", flush=True)
+    own = (remus_numbers(f"remus-prestero{pd}", {}, 50.0) for pd in ("", "-pd"))
+    print(f"{'remus-prestero, late from 50 s':42}{'  |'.join(own)}")
     for scenario in ("remus", "remus-pd"):
         result = simulate(scenario, stop_time=1500.0)
         size, time = size_of(result, AllocatedLoop()), result.time
         resting = size[(time >= 290.0) & (time < 600.0)].max()
         later = (f"{size[time.searchsorted(t)]:.2f} m at {t:g} s" for t in (600.0, 1500.0))
         print(f"after the end, {scenario}: {resting:.2f} m at most, {', '.join(later)}")
-    for name, turn in (("Remus100", steady_turn), ("Prestero", prestero_turn)):
-        for speed in (1.06, 1.5):
-            v, r, N = turn(speed)
-            print(f"turn with 15 degrees of rudder at {speed:g} m/s, {name}: {r:.3f} rad/s, radius "
-                  f"{speed / r:.1f} m, sway {v:.3f} m/s, moment of the rudder {N:.2f} N.m, over "
-                  f"the rate {N / r:.1f} kg.m2/s")  # fmt: skip
+    models()
 
 
-def remus_numbers(scenario: str, changes: Values) -> str:
+def remus_numbers(scenario: str, changes: Values, late_from: float = 120.0) -> str:
     """Numbers of a run in a line."""
-    result = simulate(scenario, changes)
+    result = simulate(system_of(scenario), changes, stop_time=280.0)
     if result.failure is not None:
         return result.failure
-    loop, late = AllocatedLoop(), result.time >= 120.0
+    loop, late = AllocatedLoop(), result.time >= late_from
     size, across = size_of(result, loop), beside(result, loop)[late].max()
     pairs = ((f"controller.tau.{k}", f"allocation.tau_attained.{k}") for k in "qr")
     pitch, yaw = (
@@ -651,37 +661,156 @@ def remus_numbers(scenario: str, changes: Values) -> str:
     return f"{largest}{pitch:4.0f}{yaw:4.0f}{command:7.1f}{rate:6.0f}"
 
 
-def steady_turn(speed: float) -> tuple[float, float, float]:
-    """Sway [m/s] and rate of turn [rad/s] of Remus100 with full rudder, and its moment [N.m].
+def prestero_vehicle() -> remus100.Parameters:
+    """Parameters of the vehicle of `remus-prestero`."""
+    found = read_scenario("remus-prestero").parameters
+    mass, z, net, x, lift_r, lift_s = (
+        found[PortName("plant", port)]
+        for port in ("mass", "r_bg.z", "net_buoyancy", "fin.x", "fin.lift.r", "fin.lift.s")
+    )
+    hull = Hull(mass=mass, r_bg=(0.0, 0.0, z), net_buoyancy=net)
+    tail = Tail(x=x, lift_r=lift_r, lift_s=lift_s)
+    return remus100.Parameters(hull=hull, tail=tail, form=Form.COEFFICIENTS)
+
+
+def force(
+    vehicle: remus100.Parameters, nu: Sequence[float], theta: float = 0.0, *fins: float
+) -> np.ndarray:
+    """Force and moment [N, N.m] on a Remus100 that does not heel, by rudder and stern planes."""
+    u, v, w, p, q, r = nu
+    delta_r, delta_s = fins or (0.0, 0.0)
+    none, mass = (0.0, 0.0, 0.0), inertia_of(vehicle)
+    state = RemusState(none, (0.0, theta, 0.0), (u, v, w, p, q, r), (delta_r, delta_s, 0.0), none)
+    made: np.ndarray = np.array(mass.M) @ accelerations(vehicle, mass, state)
+    return made
+
+
+def turning(vehicle: remus100.Parameters, nu: Sequence[float], rudder: float) -> np.ndarray:
+    """Force and moment in sway and yaw [N, N.m] on a Remus100."""
+    return force(vehicle, nu, 0.0, rudder, 0.0)[[1, 5]]
+
+
+#: Hull of remus100.m.
+MSS_HULL = Hull(length=1.0096 * 1.6, diameter=1.0096 * 0.19, mass=31.9)
+
+
+def mss_force(nu: Sequence[float], rudder: float) -> np.ndarray:
+    """Force and moment in sway and yaw of remus100.m of the MSS toolbox (6d4b553).
+
+    The drag coefficient of a cylinder is that of its cylinderDrag.m for the Reynolds numbers of
+    these turns.
+    """
+    u, v, _, _, _, r = nu
+    hull, M = MSS_HULL, inertia(MSS_HULL).M
+    reynolds = abs(v) * 1.6e6
+    c_d = float(np.interp(
+        reynolds,
+        (118086.0, 214709.0, 230940.0, 271581.0, 297098.0, 325252.0),
+        (1.21134, 1.21171, 1.20109, 1.16918, 1.11163, 1.00926),
+    ))  # fmt: skip
+    slender = np.interp(1.6 / 0.19, (5.0, 10.0), (0.62, 0.68) if reynolds < 2e5 else (0.80, 0.82))
+    sway, yaw = cross_flow(Hull(), Drag(c_d_across=c_d * float(slender)), 1025.0, v, r)
+    lift = -0.5 * 1026.0 * (u * u + v * v) * 0.0133 * 0.5 * rudder
+    Y = lift + sway - M[1, 1] / 20.0 * v - hull.mass * u * r
+    return np.array((Y, -hull.length / 2.0 * lift + yaw - M[5, 5] * r))
+
+
+def steady_turn(
+    speed: float, balance: Callable[[Sequence[float]], np.ndarray]
+) -> tuple[float, float]:
+    """Sway [m/s] and rate [rad/s] of a steady turn at a speed, by its forces in sway and yaw."""
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        v, r = x
+        return balance(((speed * speed - v * v) ** 0.5, v, 0.0, 0.0, 0.0, r))
+
+    v, r = root(residual, (-0.1, 0.15)).x
+    return float(v), float(r)
+
+
+def trim(vehicle: remus100.Parameters, speed: float) -> tuple[float, float]:
+    """Pitch and stern planes [degrees] with which a vehicle holds its depth at a speed."""
+
+    def residual(x: np.ndarray) -> np.ndarray:
+        theta, planes = x
+        nu = (speed * cos(theta), 0.0, speed * sin(theta), 0.0, 0.0, 0.0)
+        return force(vehicle, nu, theta, 0.0, planes)[[2, 4]]
+
+    theta, planes = np.degrees(root(residual, (-0.05, -0.1)).x)
+    return float(theta), float(planes)
+
+
+def largest_corner(scenario: str, moments: tuple[float, float]) -> float:
+    """Largest corner [degrees] that the planner of a scenario accepts between legs of 100 m.
 
     Args:
-        speed: through the water [m/s], which the surge is held at.
+        scenario: with the planner's vehicle, its cruise and its rounding.
+        moments: of stern planes and rudder at the cruise speed [N.m].
 
     """
-    parameters, none = Parameters(), (0.0, 0.0, 0.0)
-    u, v, r = speed, 0.0, 0.0
-    actuator = (parameters.tail.delta_max, 0.0, 0.0)
-    mass = inertia(parameters.hull)
-    for _ in range(5_000):
-        state = RemusState(none, none, (u, v, 0.0, 0.0, 0.0, r), actuator, none)
-        rates = accelerations(parameters, mass, state)
-        v, r = v + 0.02 * rates[1], r + 0.02 * rates[5]
-        u = (speed * speed - v * v) ** 0.5
-    return v, r, tail_forces(parameters.tail, state)[5]
+    own, system = read_scenario(scenario).parameters, load_scenario(scenario)[1]
+    values = {str(n): v for n, v in own.items() if "waypoint" not in n.port}
+
+    def accepted(angle: float) -> bool:
+        limits = [66.0, *(moment * cos(radians(angle) / 2.0) ** 2 for moment in moments)]
+        ends = {"tau_max": limits, "tau_min": [-limit for limit in limits], "count": 3}
+        x, y = 100.0 * cos(radians(angle)), 100.0 * sin(radians(angle))
+        points = ((0.0, 0.0), (100.0, 0.0), (100.0 + x, y))
+        path = {
+            f"waypoint[{k}].{axis}": value
+            for k, point in enumerate(points, 1)
+            for axis, value in zip("xyz", (*point, 5.0), strict=True)
+        }
+        changes = {f"planner.{name}": value for name, value in {**ends, **path}.items()}
+        try:
+            simulate(system, {**values, **changes}, stop_time=0.02)
+        except InputError:
+            return False
+        return True
+
+    low, high = 0.0, 179.0
+    while high - low > 0.5:
+        middle = (low + high) / 2.0
+        low, high = (middle, high) if accepted(middle) else (low, middle)
+    return low
 
 
-def prestero_turn(speed: float) -> tuple[float, float, float]:
-    """The same as :func:`steady_turn` with the coefficients of Prestero (2001) for sway and yaw."""
-    m, v, r = 30.48, 0.0, 0.0
-    u, rudder = speed, -Parameters().tail.delta_max
-    for _ in range(20_000):
-        Y = -1310 * v * abs(v) + 0.632 * r * abs(r) - 28.6 * u * v + 5.22 * u * r
-        N = -3.18 * v * abs(v) - 94.0 * r * abs(r) - 24.0 * u * v - 2.0 * u * r
-        dv = (Y + 9.64 * u * u * rudder - m * u * r) / (m + 35.5)
-        dr = (N - 6.15 * u * u * rudder) / (3.45 + 4.88)
-        v, r = v + 0.005 * dv, r + 0.005 * dr
-        u = (speed * speed - v * v) ** 0.5
-    return v, r, -6.15 * u * u * rudder
+def models() -> None:
+    """Compare Remus100 with its two hulls, and the model of the MSS toolbox."""
+    vehicles = {"Fossen": remus100.Parameters(), "Prestero": prestero_vehicle()}
+    for name, vehicle in vehicles.items():
+        M = inertia_of(vehicle).M
+        print(f"\n{name}: masses {', '.join(f'{M[k, k]:.3g}' for k in range(6))} kg, kg.m2")
+        show_turns(name, partial(turning, vehicle))
+        ahead, aside, full = [1.5, *[0.0] * 5], [1.5, 0.1, *[0.0] * 4], radians(15.0)
+        N, M_q = turning(vehicle, ahead, full)[1], -force(vehicle, ahead, 0.0, 0.0, full)[4]
+        drag, (Y, moment) = -force(vehicle, ahead)[0], turning(vehicle, aside, 0.0)
+        print(f"  at 1.5 m/s: moments of 15 degrees {N:.2f}, {M_q:.2f} N.m; drag {drag:.1f} N; "
+              f"by a sway of 0.1 m/s {Y:.2f} N, {moment:.2f} N.m")  # fmt: skip
+        slopes = [turning(vehicle, [1.5, a, 0.0, 0.0, 0.0, b], 0.0) for a, b in 1e-6 * np.eye(2)]
+        swaying = np.linalg.solve(np.array(M)[np.ix_((1, 5), (1, 5))], 1e6 * np.transpose(slopes))
+        print(f"  fastest growth: {max(np.linalg.eigvals(swaying).real):.2f} 1/s")
+        for net in (3.34, 7.0):
+            floats = vehicle._replace(hull=vehicle.hull._replace(net_buoyancy=net))
+            theta, planes = trim(floats, 1.5)
+            enough = (x for x in np.arange(1.5, 0.3, -0.01) if trim(floats, x)[1] < -15.0)
+            print(f"  B - W = {net:g} N: pitch {theta:.1f}, stern planes {planes:.1f} degrees at "
+                  f"1.5 m/s; more than 15 degrees at {next(enough, 0.0):.2f} m/s")  # fmt: skip
+    M, moment = inertia(MSS_HULL).M, mss_force([1.5, *[0.0] * 5], radians(15.0))[1]
+    print(f"\nMSS: sway {M[1, 1]:.3g} kg, yaw {M[5, 5]:.3g} kg.m2; moments of 15 degrees at "
+          f"1.5 m/s {moment:.2f}, {0.7 / 0.5 * moment:.2f} N.m")  # fmt: skip
+    show_turns("MSS", mss_force)
+    for scenario, moments in (("remus", (2.25, 1.61)), ("remus-prestero", (3.62, 3.62))):
+        corner = largest_corner(scenario, moments)
+        print(f"largest corner of the planner of {scenario}, rounded in 30 s: {corner:.0f} degrees")
+
+
+def show_turns(name: str, balance: Callable[[Sequence[float], float], np.ndarray]) -> None:
+    """Print steady turns, by forces in sway and yaw for a velocity and an angle of the rudder."""
+    for most, speed in product((15.0, 20.0), (1.06, 1.5)):
+        v, r = steady_turn(speed, partial(lambda angle, nu: balance(nu, angle), radians(most)))
+        print(f"  turn of {name} with {most:g} degrees of rudder at {speed:g} m/s: {r:.3f} rad/s, "
+              f"radius {speed / r:.1f} m, sway {v:.3f} m/s")  # fmt: skip
 
 
 # The BlueROV2 Heavy

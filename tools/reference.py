@@ -73,11 +73,16 @@ ROWS = 100
 #: machines may differ in the last place.
 EVERY, TOLERANCE = 10, 1e-9
 
-#: Parameter sets by name: their scenarios, and their description.
-SETS = {
-    "fig4": (("fig4",), "Parameters of Fig. 4 of the paper"),
-    "fig5": (("fig5", "fig5-pd"), "Parameters of Fig. 5 of the paper"),
-    "survey": (("path",), "Path of the survey through waypoints"),
+#: Parameter sets by name: their scenarios, their description, and their components, if not all.
+SETS: dict[str, tuple[tuple[str, ...], str, tuple[str, ...]]] = {
+    "fig4": (("fig4",), "Parameters of Fig. 4 of the paper", ()),
+    "fig5": (("fig5", "fig5-pd"), "Parameters of Fig. 5 of the paper", ()),
+    "survey": (("path",), "Path of the survey through waypoints", ()),
+    "prestero": (
+        ("remus-prestero",),
+        "Parameters of the REMUS by Prestero (2001)",
+        ("Remus100", "Allocation"),
+    ),
 }
 
 #: MIME types of files, by their endings.
@@ -159,7 +164,9 @@ def parameter_sets(component: Component) -> Iterator[tuple[str, dict[str, Value]
     """Parameter sets of an FMU from scenarios, by name."""
     if component.description.modelName not in components():
         return
-    for name, (scenarios, _) in SETS.items():
+    for name, (scenarios, _, only) in SETS.items():
+        if only and component.description.modelName not in only:
+            continue
         values: dict[str, Value] = {}
         for scenario in scenarios:
             _, system = load_scenario(scenario)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi
 from typing import Annotated, NamedTuple
 
 from auv_fmu import Refusal, Variable, __author__, __license__, __version__
@@ -64,7 +65,7 @@ class Outputs(NamedTuple):
 
 
 def check(parameters: Parameters) -> None:
-    """Refuse a hull that is not slender, or that is heavier at its top."""
+    """Refuse a hull that is not slender, capsizes, displaces too much or has no inertia."""
     hull = parameters.hull
     if not hull.diameter <= _THICKEST * hull.length:
         raise Refusal(
@@ -76,6 +77,22 @@ def check(parameters: Parameters) -> None:
             f"r_bg.z = {hull.r_bg[2]:g} must be above 0: a vehicle with its centre of mass on top "
             "capsizes"
         )
+    if hull.net_buoyancy != 0.0:
+        weight = hull.mass * hull.gravity
+        cylinder = pi / 4.0 * hull.diameter * hull.diameter * hull.length
+        largest = parameters.tail.rho * hull.gravity * cylinder
+        if not 0.0 < weight + hull.net_buoyancy <= largest:
+            raise Refusal(
+                f"net_buoyancy = {hull.net_buoyancy:g} and a weight of {weight:g} N: the buoyancy "
+                f"must be above 0 and at most {largest:g} N, which a cylinder around the hull has"
+            )
+    M = remus100.inertia_of(parameters).M
+    for k in range(6):
+        if not M[k, k] > 0.0:
+            raise Refusal(
+                f"a mass or moment of inertia, with its added mass, is {M[k, k]:g}; it must be "
+                "above 0: mend X.du, Y.dv, Z.dw, K.dp, M.dq, N.dr or inertia"
+            )
 
 
 def start(parameters: Parameters, inputs: Inputs) -> RemusState:

@@ -50,7 +50,9 @@ def both(
     return ours
 
 
-@pytest.mark.parametrize("scenario", ["fig3b", "path", "sea", "remus-pd", "formation-lost-link"])
+@pytest.mark.parametrize(
+    "scenario", ["fig3b", "path", "sea", "remus-pd", "remus-prestero", "formation-lost-link"]
+)
 def test_scenario_is_the_same(dist: Path, native: Path, scenario: str):
     both(dist, native, scenario, Experiment(2.0, STEP))
 

@@ -91,27 +91,35 @@ def test_commands_are_measured_where_the_allocation_takes_them():
     assert found["allocation.tau.u"].max() == 0.0
 
 
-def test_the_planner_knows_the_steady_turn_with_full_rudder(tmp_path):
+@pytest.mark.parametrize(
+    ("name", "n", "angle", "moments"),
+    [("remus", 95.4, 22.5, (2.25, 1.61)), ("remus-prestero", 80.5, 45.0, (3.62, 3.62))],
+)
+def test_the_planner_knows_the_steady_turn_with_full_rudder(name, n, angle, moments, tmp_path):
     """Its d66 and d22, and its limits: of an FMU that turns for a minute, and of its corners."""
+    expected = {str(name): value for name, value in read_scenario(name).parameters.items()}
+    vehicle = {name: value for name, value in expected.items() if name.startswith("plant.")}
     tight = {"plant.eta0.z": 5.0, "plant.nu0.u": 1.5, "plant.noise.std": 0.0}
+    # The plane of the turn: nothing lifts the vehicle.
+    tight["plant.net_buoyancy"] = 0.0
     scenario = tmp_path / "turn.toml"
     scenario.write_text(
         'only = ["plant"]\n[components]\nplant = "Remus100"\n[wires]\n'
         '"plant.tau" = false\n"plant.tau_w" = false\n"disturbance.nu" = false\n'
     )
-    values = {**tight, "plant.command.delta_r": np.radians(15.0), "plant.command.n": 95.4}
+    fins = {"plant.command.delta_r": np.radians(15.0), "plant.command.n": n}
+    values = {**vehicle, **tight, **fins}
     turn = simulate(str(scenario), values, kind="native", stop_time=120.0)
     u, v, r, N = (
         turn[name][-1]
         for name in ("plant.nu_r.u", "plant.nu_r.v", "plant.nu.r", "plant.tau_applied.r")
     )
     assert np.hypot(u, v) == pytest.approx(1.5, abs=0.01)
-    expected = {str(name): value for name, value in read_scenario("remus").parameters.items()}
     assert expected["planner.d66"] == pytest.approx(N / r, rel=0.02)
     assert expected["planner.d22"] == pytest.approx(-expected["planner.m11"] * u * r / v, rel=0.03)
     assert expected["planner.m22"] == expected["planner.m33"] == expected["planner.m11"]
-    slowest = np.cos(np.radians(22.5))
-    limits = np.multiply(slowest**2, (2.25, 1.61))
+    slowest = np.cos(np.radians(angle))
+    limits = np.multiply(slowest**2, moments)
     assert expected["planner.tau_max"][1:] == pytest.approx(limits, abs=0.006)
 
 

@@ -19,6 +19,8 @@ from auv_fmu.guidance import formation
 from auv_fmu.paper import control_point, euler, plant
 from auv_fmu.paper.observer import EULER
 from auv_fmu.paper.saturation import Saturation
+from auv_fmu.remus.prestero import Coefficients
+from auv_fmu.remus.remus100 import Form
 from auv_fmu.water.waves import Spectrum
 
 TEN, ZERO_3, ZERO_4, ZERO_5, ZERO_6 = (10.0,) * 3, *((0.0,) * n for n in (3, 4, 5, 6))
@@ -92,6 +94,7 @@ REMUS_100 = {
         "mass": pytest.approx(4 / 3 * pi * 1026 * 0.8 * 0.095**2, rel=1e-13),
         "gravity": 9.81,
         "r_bg": (0.0, 0.0, 0.02),
+        "net_buoyancy": 0.0,
         "added_roll": 0.3,
     },
     "Drag": {
@@ -132,7 +135,10 @@ REMUS_100 = {
         "eta0": ZERO_6,
         "nu0": ZERO_6,
         "current": ZERO_3,
+        "form": Form.SPHEROID,
     },
+    # Prestero's: tests/unit/auv_fmu/remus/test_prestero.py compares them with his tables.
+    "Coefficients": Coefficients()._asdict(),
     "allocation.Parameters": {"speed": 1.5, "measured": False},
 }
 

@@ -1,4 +1,4 @@
-"""The hull of the REMUS 100: its mass with added mass, its drag and lift, its righting moment.
+"""The hull of the REMUS 100: its mass with added mass, its drag and lift, its weight and buoyancy.
 
 The hull is a spheroid with the added mass of Lamb's factors. The model is taken from the class
 `remus100` in PythonVehicleSimulator 1.0.1 (vehicles/remus100.py, lib/gnc.py). Not in the paper.
@@ -27,18 +27,19 @@ _STRIPS = 20
 
 
 class Hull(NamedTuple):
-    """The hull, a neutrally buoyant spheroid."""
+    """The hull, a spheroid."""
 
     length: Annotated[float, Variable("m", "Length of the hull", POSITIVE)] = 1.6
     diameter: Annotated[float, Variable("m", "Diameter of the hull", POSITIVE)] = 0.19
-    mass: Annotated[
-        float, Variable("kg", "Mass; the hull is as heavy as its displacement", POSITIVE)
-    ] = DISPLACED
+    mass: Annotated[float, Variable("kg", "Mass", POSITIVE)] = DISPLACED
     gravity: Annotated[float, Variable("m/s2", "Acceleration of gravity", 0.0)] = 9.81
     r_bg: Annotated[
         Vector3,
         Variable(POSITION, "Centre of mass from the centre of buoyancy, body frame (r_bg)"),
     ] = (0.0, 0.0, 0.02)
+    net_buoyancy: Annotated[
+        float, Variable("N", "Buoyancy less weight (B - W); 0: neither floats nor sinks")
+    ] = 0.0
     added_roll: Annotated[
         float, Variable("1", "Added moment of inertia in roll, per inertia of the hull", 0.0)
     ] = 0.3
@@ -92,10 +93,11 @@ class Drag(NamedTuple):
 
 
 class Inertia(NamedTuple):
-    """Masses and moments of inertia, which depend on the hull only."""
+    """Masses and moments of inertia, which depend on parameters only."""
 
     i_x: float  #: inertia of the hull about its centre of mass, roll [kg.m2]
-    i_y: float  #: the same, pitch and yaw [kg.m2]
+    i_y: float  #: the same, pitch [kg.m2]
+    i_z: float  #: the same, yaw [kg.m2]
     a_11: float  #: added mass in surge [kg]
     a_22: float  #: added mass in sway and heave [kg]
     a_44: float  #: added moment of inertia in roll [kg.m2]
@@ -123,18 +125,31 @@ def inertia(hull: Hull) -> Inertia:
     k_55 = e2 * e2 * gap / ((2.0 - e2) * (2.0 * e2 - (2.0 - e2) * gap))
     a_11, a_22 = m * k_1, m * k_2
     a_44, a_55 = hull.added_roll * i_x, k_55 * i_y
+    M = mass_matrix(hull, (i_x, i_y, i_y), (a_11, a_22, a_22, a_44, a_55, a_55))
+    return Inertia(i_x, i_y, i_y, a_11, a_22, a_44, a_55, M)
+
+
+def mass_matrix(hull: Hull, i: Vector3, a: Vector6) -> Annotated[Matrix, 6, 6]:
+    """Mass matrix of the hull, and of added mass that couples no axes.
+
+    Args:
+        hull: parameters.
+        i: moments of inertia about the centre of mass [kg.m2].
+        a: added masses and moments of inertia [kg, kg.m2].
+
+    """
+    m = hull.mass
     x, y, z = hull.r_bg
-    M = Matrix(
+    return Matrix(
         (
-            (m + a_11, 0.0, 0.0, 0.0, m * z, -m * y),
-            (0.0, m + a_22, 0.0, -m * z, 0.0, m * x),
-            (0.0, 0.0, m + a_22, m * y, -m * x, 0.0),
-            (0.0, -m * z, m * y, i_x + m * (y * y + z * z) + a_44, -m * x * y, -m * x * z),
-            (m * z, 0.0, -m * x, -m * x * y, i_y + m * (x * x + z * z) + a_55, -m * y * z),
-            (-m * y, m * x, 0.0, -m * x * z, -m * y * z, i_y + m * (x * x + y * y) + a_55),
+            (m + a[0], 0.0, 0.0, 0.0, m * z, -m * y),
+            (0.0, m + a[1], 0.0, -m * z, 0.0, m * x),
+            (0.0, 0.0, m + a[2], m * y, -m * x, 0.0),
+            (0.0, -m * z, m * y, i[0] + m * (y * y + z * z) + a[3], -m * x * y, -m * x * z),
+            (m * z, 0.0, -m * x, -m * x * y, i[1] + m * (x * x + z * z) + a[4], -m * y * z),
+            (-m * y, m * x, 0.0, -m * x * z, -m * y * z, i[2] + m * (x * x + y * y) + a[5]),
         )
     )
-    return Inertia(i_x, i_y, a_11, a_22, a_44, a_55, M)
 
 
 def coriolis(hull: Hull, mass: Inertia, nu_r: Vector6) -> Vector6:
@@ -155,7 +170,7 @@ def coriolis(hull: Hull, mass: Inertia, nu_r: Vector6) -> Vector6:
     x, y, z = cross(rates, hull.r_bg)
     momentum = m * (u + x), m * (v + y), m * (w + z)
     x, y, z = cross(hull.r_bg, momentum)
-    turning = x + mass.i_x * p, y + mass.i_y * q, z + mass.i_y * r
+    turning = x + mass.i_x * p, y + mass.i_y * q, z + mass.i_z * r
     force = cross(rates, momentum)
     moment = add(cross(velocity, momentum), cross(rates, turning))
     return (
@@ -228,3 +243,9 @@ def righting(hull: Hull, phi: float, theta: float) -> Vector3:
         -weight * (z * sin(theta) + x * down),
         weight * (x * across + y * sin(theta)),
     )
+
+
+def rising(hull: Hull, phi: float, theta: float) -> Vector3:
+    """Force (u, v, w) [N] of a buoyancy that is not the weight, at the centre of buoyancy."""
+    net = hull.net_buoyancy
+    return net * sin(theta), -net * cos(theta) * sin(phi), -net * cos(theta) * cos(phi)

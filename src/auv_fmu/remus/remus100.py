@@ -1,16 +1,18 @@
 """The REMUS 100, an underwater vehicle with fins and one propeller, with published parameters.
 
 The model is taken from the class `remus100` in PythonVehicleSimulator 1.0.1, by Fossen; the page of
-the component has the source of each number and the oddities. Not in the paper. Everything refers to
-the centre of buoyancy, the origin of the body frame: x forward, y to starboard, z down.
+the component has the source of each number and the oddities. The hull may have the coefficients of
+Prestero instead. Not in the paper. Everything refers to the centre of buoyancy, the origin of the
+body frame: x forward, y to starboard, z down.
 """
 
 from __future__ import annotations
 
+from enum import IntEnum
 from math import cos, exp, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.language.arrays import Vector
+from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.linear_algebra import solve
 from auv_fmu.language.quantities import ETA, EULER, NU, POSITION, VELOCITY
 from auv_fmu.language.variable import Refusal, Variable
@@ -18,6 +20,7 @@ from auv_fmu.language.vectors import Vector3, Vector6, add, add_scaled
 from auv_fmu.paper.attitude import rotate, rotation_from_euler
 from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
 from auv_fmu.paper.plant import Localisation
+from auv_fmu.remus import prestero
 from auv_fmu.remus.hull import (
     Drag,
     Hull,
@@ -27,8 +30,21 @@ from auv_fmu.remus.hull import (
     inertia,
     lift_and_drag,
     righting,
+    rising,
 )
+from auv_fmu.remus.prestero import Coefficients
 from auv_fmu.remus.tail import ACTUATOR, FASTEST, FASTEST_TURN, Tail, forces, limit_tail
+
+
+class Form(IntEnum):
+    """Form of the inertia and the forces of the hull."""
+
+    SPHEROID = 0  #: Lamb's factors, lift, drag and cross-flow, as in PythonVehicleSimulator
+    COEFFICIENTS = 1  #: products of velocities, as in Prestero's thesis
+
+
+#: Module-level name, which Python looks up faster than a member of the class.
+COEFFICIENTS = Form.COEFFICIENTS
 
 
 class TooFast(ArithmeticError):
@@ -59,6 +75,15 @@ class Parameters(NamedTuple):
     current: Annotated[
         Vector3, Variable(VELOCITY, "Ocean current in the earth frame", tunable=True)
     ] = (0.0, 0.0, 0.0)
+    form: Annotated[
+        Form,
+        Variable(
+            "1",
+            "Form of the hull: spheroid, or with the coefficients inertia, X, Y, Z, K, M, N",
+            name="hull",
+        ),
+    ] = Form.SPHEROID
+    coefficients: Annotated[Coefficients, Variable(name="")] = Coefficients()
 
 
 class RemusState(NamedTuple):
@@ -95,6 +120,13 @@ def tail_forces(tail: Tail, state: RemusState) -> Vector6:
     return forces(tail, state.actuator, u, v, w, sqrt(over_ground))
 
 
+def inertia_of(parameters: Parameters) -> Inertia:
+    """Masses and moments of inertia of the hull, in its form."""
+    if parameters.form == COEFFICIENTS:
+        return prestero.inertia(parameters.coefficients, parameters.hull)
+    return inertia(parameters.hull)
+
+
 def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> Vector6:
     """Accelerations by M d nu_r/dt + C(nu_r) nu_r + D(nu_r) nu_r + g(eta) = tau.
 
@@ -107,20 +139,62 @@ def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> V
         d/dt (u, v, w, p, q, r) over ground [m/s2, rad/s2], body frame.
 
     """
-    hull, drag, tail = parameters.hull, parameters.drag, parameters.tail
+    hull, phi, theta = parameters.hull, state.euler[0], state.euler[1]
     nu_r = through_water(state)
-    u, v, w, p, q, r = nu_r
-    tau = tail_forces(tail, state)
+    tau = tail_forces(parameters.tail, state)
     c = coriolis(hull, mass, nu_r)
+    g = righting(hull, phi, theta)
+    if parameters.form == COEFFICIENTS:
+        water = prestero.forces(parameters.coefficients, nu_r)
+        force = Vector(
+            (
+                tau[0] + water[0] - c[0],
+                tau[1] + water[1] - c[1],
+                tau[2] + water[2] - c[2],
+                tau[3] + water[3] - c[3] + g[0],
+                tau[4] + water[4] - c[4] + g[1],
+                tau[5] + water[5] - c[5] + g[2],
+            )
+        )
+    else:
+        force = on_spheroid(parameters, mass.M, nu_r, tau, c, g)
+    if hull.net_buoyancy != 0.0:
+        rise = rising(hull, phi, theta)
+        force = force + Vector((rise[0], rise[1], rise[2], 0.0, 0.0, 0.0))
+    dnu = solve(mass.M, force)
+    r = nu_r[5]
+    u_c, v_c, _ = water_in_body(state.euler[2], state.water)
+    return dnu[0] + r * v_c, dnu[1] - r * u_c, dnu[2], dnu[3], dnu[4], dnu[5]
+
+
+def on_spheroid(
+    parameters: Parameters,
+    M: Annotated[Matrix, 6, 6],
+    nu_r: Vector6,
+    tau: Vector6,
+    c: Vector6,
+    g: Vector3,
+) -> Annotated[Vector, 6]:
+    """Force and moment on a hull that is a spheroid [N, N.m].
+
+    Args:
+        parameters: of the vehicle.
+        M: its mass matrix.
+        nu_r: (u, v, w, p, q, r) through the water [m/s, rad/s].
+        tau: of fins and propeller.
+        c: Coriolis forces.
+        g: righting moment.
+
+    """
+    hull, drag, tail = parameters.hull, parameters.drag, parameters.tail
+    u, v, w, p, q, r = nu_r
     lift = lift_and_drag(hull, drag, tail.rho, u, v, w)
     across, turning = cross_flow(hull, drag, tail.rho, v, r)
-    g = righting(hull, state.euler[0], state.euler[1])
-    M = mass.M
     fade = exp(-drag.fading * sqrt(u * u + v * v + w * w))
     upright = hull.mass * hull.gravity * hull.r_bg[2]
     K_p = M[3, 3] * 2.0 * drag.zeta_roll * sqrt(upright / M[3, 3])
     M_q = M[4, 4] * 2.0 * drag.zeta_pitch * sqrt(upright / M[4, 4])
-    force = Vector(
+    return Vector(
         (
             tau[0] + lift[0] - c[0] - M[0, 0] / drag.T_surge * fade * u,
             tau[1] + across - c[1] - M[1, 1] / drag.T_sway * fade * v,
@@ -130,9 +204,6 @@ def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> V
             tau[5] + turning - c[5] - M[5, 5] / drag.T_yaw * r + g[2],
         )
     )
-    dnu = solve(M, force)
-    u_c, v_c, _ = water_in_body(state.euler[2], state.water)
-    return dnu[0] + r * v_c, dnu[1] - r * u_c, dnu[2], dnu[3], dnu[4], dnu[5]
 
 
 def euler_rates(phi: float, theta: float, p: float, q: float, r: float) -> Vector3:
@@ -201,8 +272,9 @@ def step(
 def carried(state: RemusState, dwater: Vector3, h: float) -> RemusState:
     """State after a step with accelerating water, from the state after a step without.
 
-    As in :func:`auv_fmu.paper.plant.carried`: the vehicle is neutrally buoyant, so its velocity
-    over ground changes with the water, and its velocity through the water does not.
+    As in :func:`auv_fmu.paper.plant.carried`: a neutrally buoyant vehicle's velocity over ground
+    changes with the water, and its velocity through the water does not. A net buoyancy is neglected
+    here: of 7 N, it is 1 % of the mass with added mass that the water accelerates.
 
     Args:
         state: of the vehicle after the step, with the water as it was at the beginning.
@@ -263,7 +335,7 @@ def rates(
         state.position, state.euler, state.nu, actuator, add(parameters.current, water)
     )
     check_speed(state)
-    du, dv, dw, dp, dq, dr = accelerations(parameters, inertia(parameters.hull), state)
+    du, dv, dw, dp, dq, dr = accelerations(parameters, inertia_of(parameters), state)
     phi, theta, psi = state.euler
     u, v, w, p, q, r = state.nu
     x, y, z = water_in_body(psi, dwater)
@@ -336,7 +408,7 @@ def advance(
     flow = add(parameters.current, water)
     state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
     check_speed(state)
-    mass = inertia(parameters.hull)
+    mass = inertia_of(parameters)
     state = carried(step(parameters, mass, state, command, h), dwater, h)
     check_speed(state)
     return state

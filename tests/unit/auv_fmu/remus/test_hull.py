@@ -9,7 +9,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from auv_fmu.remus.hull import Drag, Hull, coriolis, cross_flow, inertia, lift_and_drag, righting
+from auv_fmu.paper.attitude import rotate, rotation_from_euler
+from auv_fmu.remus.hull import (
+    Drag,
+    Hull,
+    coriolis,
+    cross_flow,
+    inertia,
+    lift_and_drag,
+    righting,
+    rising,
+)
 
 DRAG = Drag()
 velocities = st.tuples(*(st.floats(-2.0, 2.0),) * 6)
@@ -60,6 +70,13 @@ def test_righting_moment_is_the_slope_of_the_potential_energy(phi, theta):
     down = np.array([-sin(theta), cos(theta) * sin(phi), cos(theta) * cos(phi)])
     moment = np.cross((x, y, z), hull.mass * hull.gravity * down)
     assert righting(hull, phi, theta) == pytest.approx(moment, abs=1e-9)
+
+
+@given(phi=st.floats(-3.0, 3.0), theta=st.floats(-1.5, 1.5), psi=st.floats(-3.0, 3.0))
+def test_buoyancy_beyond_the_weight_pulls_up_in_any_attitude(phi, theta, psi):
+    force = rising(Hull(net_buoyancy=7.0), phi, theta)
+    in_earth = rotate(rotation_from_euler(phi, theta, psi), force)
+    assert in_earth == pytest.approx((0.0, 0.0, -7.0), abs=1e-12)
 
 
 def test_strips_of_the_cross_flow_are_the_integral_and_one_more():

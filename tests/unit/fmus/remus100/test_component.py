@@ -7,14 +7,21 @@ from pythonfmu.enums import Fmi2Status
 
 from auv_fmu import Refusal
 from auv_fmu.remus import remus100
-from auv_fmu.remus.remus100 import Parameters, TooFast
-from fmus.remus100.component import check_state
+from auv_fmu.remus.prestero import Coefficients
+from auv_fmu.remus.remus100 import Form, Parameters, TooFast
+from fmus.remus100.component import check, check_state
 from support.instances import ClassInstance
 
 
 @pytest.mark.parametrize(
     ("name", "value", "good"),
-    [("diameter", 1.5, 0.2), ("length", 0.2, 1.6), ("r_bg__z", 0.0, 0.02)],
+    [
+        ("diameter", 1.5, 0.2),
+        ("length", 0.2, 1.6),
+        ("r_bg__z", 0.0, 0.02),
+        ("net_buoyancy", -305.0, 7.0),
+        ("net_buoyancy", 155.0, 152.0),
+    ],
 )
 def test_hulls_that_the_model_does_not_hold_for_are_refused(name, value, good):
     driver = ClassInstance("Remus100", **{name: value})
@@ -23,6 +30,14 @@ def test_hulls_that_the_model_does_not_hold_for_are_refused(name, value, good):
     driver.set(**{name: good})
     driver.slave.exit_initialization_mode()
     assert driver.step()
+
+
+def test_coefficients_that_leave_no_mass_are_refused_where_they_are_used():
+    wrong = Coefficients()._replace(N=(1.93, 3.5, -3.18, -94.0, -24.0, -1.93, -2.0, -4.86))
+    check(Parameters(coefficients=wrong))
+    check(Parameters(form=Form.COEFFICIENTS))
+    with pytest.raises(Refusal, match=r"is -0\.05; it must be above 0: mend"):
+        check(Parameters(form=Form.COEFFICIENTS, coefficients=wrong))
 
 
 def test_a_vehicle_that_nothing_commands_stays_where_it_is():
