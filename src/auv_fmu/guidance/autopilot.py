@@ -70,8 +70,8 @@ class Parameters(NamedTuple):
 
     model: Annotated[Model, Variable(name="")] = Model()
     speed: Poles = Poles(1.0)
-    depth: Poles = Poles(0.2)
-    pitch: Poles = Poles(1.0)
+    depth: Poles = Poles(0.1)
+    pitch: Poles = Poles(2.0)
     heading: Poles = Poles(1.0)
     vertical: Annotated[Vertical, Variable("1", "Quantity that is held in the vertical plane")] = (
         Vertical.DEPTH

@@ -43,7 +43,7 @@ from auv_fmu.language.vectors import Vector3, add_scaled, distance
 from auv_fmu.paper.actuators import limit
 from auv_fmu.paper.motion_planner import STEEPEST
 
-_UNUSED = (0.0,) * 27
+_UNUSED = (0.0,) * 28
 
 
 class Law(IntEnum):
@@ -55,12 +55,12 @@ class Law(IntEnum):
 
 
 class Path(NamedTuple):
-    """Waypoints; the defaults are a survey of three lines that begins below the surface."""
+    """Waypoints; the defaults are two lines of a survey, the first of which dives."""
 
-    n: Count = 5
-    x: North = (0.0, 60.0, 60.0, 0.0, 0.0, *_UNUSED)
-    y: East = (0.0, 0.0, 30.0, 30.0, 60.0, *_UNUSED)
-    z: Down = (2.0, 8.0, 8.0, 8.0, 8.0, *_UNUSED)
+    n: Count = 4
+    x: North = (0.0, 100.0, 100.0, 0.0, *_UNUSED)
+    y: East = (0.0, 0.0, 20.0, 20.0, *_UNUSED)
+    z: Down = (2.0, 10.0, 10.0, 10.0, *_UNUSED)
 
 
 class Parameters(NamedTuple):
@@ -76,7 +76,7 @@ class Parameters(NamedTuple):
     ] = 5.0
     kappa: Annotated[
         float, Variable("m/s", "Integral gain of the integral law", 0.0, tunable=True)
-    ] = 0.3
+    ] = 0.25
     gamma_h: Annotated[
         float,
         Variable("rad/(m.s)", "Gain of the adaptive law, horizontal plane", 0.0, tunable=True),
