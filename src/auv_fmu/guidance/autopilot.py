@@ -1,6 +1,6 @@
 """Autopilots of speed, depth, pitch and heading, whose gains follow from stated poles.
 
-Not in the paper. Each is designed for a linear model of its motion alone:
+Not in the paper. Each is designed for a linear model of its motion, on its own:
 
     speed:    m11 du/dt + d11 u + d11_quadratic |u| u = tau_u
     pitch:    m55 dq/dt + d55 q + righting sin(theta) = tau_q,  dtheta/dt = q
@@ -36,7 +36,7 @@ _SHARE = 0.1
 
 
 class Vertical(IntEnum):
-    """What the autopilot holds in the vertical plane."""
+    """Quantity that the autopilot holds in the vertical plane."""
 
     DEPTH = 0
     PITCH = 1

@@ -1,6 +1,6 @@
 """Line-of-sight guidance along straight legs between waypoints, in three dimensions.
 
-Not in the paper. The laws are those of
+Not in the paper. The laws come from
 
 - LOS: T. I. Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed.,
   Wiley;
@@ -14,10 +14,10 @@ Not in the paper. The laws are those of
 They agree with the functions `LOSchi`, `ILOSpsi`, `ALOSpsi`, `ALOS3D` and `LOSobserver` of the
 Marine Systems Simulator (MSS, github.com/cybergalactic/MSS, commit 736a3d1), with these departures:
 
-- A leg ends at a distance along it, in three dimensions. So does it in `ILOSpsi` and `ALOSpsi`,
-  which have two; `ALOS3D` waits for a sphere around the waypoint, which a vehicle can miss.
+- A leg ends at a distance along it, in three dimensions. `ILOSpsi` and `ALOSpsi` do the same in
+  two; `ALOS3D` waits for a sphere around the waypoint, which a vehicle can miss.
 - :func:`rate` is in rad/s. `LOSobserver` returns T_f times it, as an angle.
-- ILOS in the vertical plane is the horizontal law with the sign of z; MSS has none.
+- ILOS in the vertical plane is the horizontal law with the sign of z; MSS does not have it.
 
 On each leg, with its azimuth pi_h, its elevation pi_v, and the errors (x_e, y_e, z_e) across it:
 
@@ -55,7 +55,7 @@ class Law(IntEnum):
 
 
 class Path(NamedTuple):
-    """Waypoints; the defaults are two lines of a survey, the first of which dives."""
+    """Waypoints; the defaults are two lines of a survey. The first dives."""
 
     n: Count = 4
     x: North = (0.0, 100.0, 100.0, 0.0, *_UNUSED)
@@ -181,7 +181,7 @@ def abeam(line: Leg, x_e: float) -> Vector3:
 
 
 def depth(path: Path, k: int, z: float) -> float:
-    """A depth of leg k, held between those of its ends [m]."""
+    """A depth of leg k, limited to the depths of its ends [m]."""
     begin, end = path.z[k - 1], path.z[k if k < path.n else k - 1]
     return limit(z, min(begin, end), max(begin, end))
 
@@ -362,7 +362,7 @@ def advance(parameters: Parameters, state: State, line: Leg, e: Vector3, h: floa
 
 
 class Position(NamedTuple):
-    """What is measured."""
+    """The measured position."""
 
     y: Annotated[Vector3, Variable(POSITION, "Position of the vehicle, as measured")]
 
@@ -370,7 +370,7 @@ class Position(NamedTuple):
 class Posture(NamedTuple):
     """Desired depth and attitude."""
 
-    z: Annotated[float, Variable("m", "Desired depth, between those of the leg's ends")]
+    z: Annotated[float, Variable("m", "Desired depth, limited to the depths of the leg's ends")]
     theta: Annotated[float, Variable("rad", "Desired pitch, without jumps")]
     psi: Annotated[float, Variable("rad", "Desired heading, without jumps: not wrapped")]
 

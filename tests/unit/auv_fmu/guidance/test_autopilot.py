@@ -28,18 +28,18 @@ from auv_fmu.guidance.autopilot import (
 from auv_fmu.paper.actuators import Limits
 
 AT_REST = State(0.0, 0.0, 0.0, 0.0)
+HERE, STILL = Desired(0.0, 0.0, 0.0), DesiredMotion(0.0, 0.0, 0.0)
 NO_LIMITS = Limits((-inf,) * 3, (inf,) * 3)
 MODEL = Model(d11_quadratic=6.0)
 PITCH = Parameters(MODEL, vertical=Vertical.PITCH, limits=NO_LIMITS)
 
 
-def inputs(z=0.0, theta=0.0, psi=0.0, u=0.0, q=0.0, r=0.0, to=Desired(0.0, 0.0, 0.0),
-           moving=DesiredMotion(0.0, 0.0, 0.0)) -> Inputs:  # fmt: skip
+def inputs(z=0.0, theta=0.0, psi=0.0, u=0.0, q=0.0, r=0.0, to=HERE, moving=STILL) -> Inputs:
     """Measured values, and desired ones."""
     return Inputs(Measured(z, theta, psi), MeasuredMotion(u, q, r), to, moving)
 
 
-def test_law_is_that_of_python_vehicle_simulator():
+def test_law_agrees_with_python_vehicle_simulator():
     """`PIDpolePlacement`, whose integral gain has m wn^2 - k where this one has m wn^2."""
     with (Path(__file__).parent / "mss" / "pid.csv").open(encoding="utf-8") as file:
         rows = [{name: float(x) for name, x in row.items()} for row in csv.DictReader(file)]
@@ -54,9 +54,7 @@ def test_law_is_that_of_python_vehicle_simulator():
 def closed_loop(rates, n: int) -> np.ndarray:
     """Characteristic polynomial of rates at rest, by central differences."""
     small = 1e-6
-    columns = [
-        (np.array(rates(small * e)) - rates(-small * e)) / (2 * small) for e in np.eye(n)
-    ]
+    columns = [(np.array(rates(small * e)) - rates(-small * e)) / (2 * small) for e in np.eye(n)]
     return np.poly(np.transpose(columns))
 
 
@@ -66,7 +64,7 @@ def of_design(omega: float, zeta: float, share: float) -> list[float]:
 
 
 @pytest.mark.parametrize("poles", [Poles(0.5, 1.0), Poles(2.0, 0.7)])
-def test_poles_of_heading_and_pitch_are_those_of_the_design(poles: Poles):
+def test_heading_and_pitch_have_the_poles_of_the_design(poles: Poles):
     """The linear model of each, closed by its law."""
     parameters = PITCH._replace(heading=poles, pitch=poles)
 
@@ -86,8 +84,8 @@ def test_poles_of_heading_and_pitch_are_those_of_the_design(poles: Poles):
         np.testing.assert_allclose(closed_loop(rates, 3), expected, rtol=1e-6)
 
 
-def test_poles_of_speed_and_depth_are_those_of_the_design():
-    """Of speed at the desired one; of depth with a pitch that is there at once."""
+def test_speed_and_depth_have_the_poles_of_the_design():
+    """The speed near the desired one, and the depth with a pitch that is there at once."""
     poles, u_d = Poles(0.4, 0.8), 1.5
     parameters = Parameters(MODEL, poles, poles, theta_max=1.4, limits=NO_LIMITS)
     moving = DesiredMotion(u_d, 0.0, 0.0)
@@ -151,7 +149,7 @@ def test_depth_asks_for_at_most_the_largest_pitch():
     assert astern.theta_c == 0.0
 
 
-def test_step_of_the_heading_is_that_of_the_linear_design():
+def test_step_of_the_heading_follows_the_linear_design():
     """In steps of 20 ms by Euler's scheme, against the exact solution of its poles."""
     parameters, h = PITCH._replace(heading=Poles(1.0, 1.0)), 0.02
     psi, r, state, found = 0.5, 0.0, AT_REST, []

@@ -72,20 +72,20 @@ def follow_calls(
         assert state.k == waypoints.n
 
 
-def test_los_is_that_of_mss():
+def test_los_agrees_with_mss():
     calls = [*follow_calls(Law.PROPORTIONAL, runs("LOSchi"), ("Delta_h", "radius"))]
     assert len(calls) == 140
     for _, psi, y_e, results in calls:
         assert [psi, y_e] == pytest.approx(results, **CLOSE)
 
 
-def test_integral_law_is_that_of_mss():
+def test_integral_law_agrees_with_mss():
     names = "Delta_h", "kappa", "h", "radius"
     for _, psi, y_e, results in follow_calls(Law.INTEGRAL, runs("ILOSpsi"), names):
         assert [psi, y_e] == pytest.approx(results, **CLOSE)
 
 
-def test_adaptive_law_is_that_of_mss():
+def test_adaptive_law_agrees_with_mss():
     """With its estimate of the crab angle, and its waypoint after each call."""
     names, before = ("Delta_h", "gamma_h", "h", "radius"), 0.0
     for state, psi, y_e, results in follow_calls(Law.ADAPTIVE, runs("ALOSpsi"), names):
@@ -94,7 +94,7 @@ def test_adaptive_law_is_that_of_mss():
         before = state.learnt_h
 
 
-def test_adaptive_law_in_three_dimensions_is_that_of_mss():
+def test_adaptive_law_in_three_dimensions_agrees_with_mss():
     """A leg ends where MSS's ends: at a sphere around its waypoint, not at a distance along it."""
     held = 0
     for waypoints, rows in runs("ALOS3D"):
@@ -117,7 +117,7 @@ def test_adaptive_law_in_three_dimensions_is_that_of_mss():
     assert held > 10
 
 
-def test_observer_is_that_of_mss():
+def test_observer_agrees_with_mss():
     """It returns T_f times the rate, which is an angle; :func:`los.rate` is the rate."""
     for run in (1, 2, 3):
         for angle, scaled, commanded, h, K_f, *results in table()["LOSobserver", run]:
@@ -126,8 +126,8 @@ def test_observer_is_that_of_mss():
             assert found == pytest.approx(results, rel=1e-12, abs=4e-12)
 
 
-def test_errors_are_those_of_mss():
-    """Of crosstrackWpt3D only y_e: the sign of an element of its R_z is wrong, so lengths change."""
+def test_errors_agree_with_mss():
+    """Only y_e of crosstrackWpt3D: an element of its R_z has a wrong sign, so lengths change."""
     for run in range(1, 21):
         (x2, y2, x1, y1, x, y, y_e), [angle, wrapped] = (
             table()[name, run][0] for name in ("crosstrackWpt", "ssa")
@@ -152,7 +152,7 @@ places = st.tuples(*(st.floats(-1e3, 1e3),) * 3)
 
 
 @given(places, places, places)
-def test_errors_and_the_point_abeam_are_those_of_a_line(begin, end, place):
+def test_errors_and_the_point_abeam_are_projections_on_a_line(begin, end, place):
     """Against the projection on a line by vectors."""
     way = np.subtract(end, begin)
     if np.linalg.norm(way) < 1.0:
@@ -177,14 +177,14 @@ def test_a_leg_ends_for_a_vehicle_that_misses_its_waypoint():
     assert los.next_leg(waypoints, 3, 3.0, 1e9) == 3
 
 
-def test_desired_depth_is_between_those_of_the_ends():
+def test_desired_depth_is_limited_to_the_depths_of_the_ends():
     waypoints = path([[0.0, 0.0, 2.0], [50.0, 0.0, 7.0], [100.0, 0.0, 4.0]])
     assert [los.depth(waypoints, k, z) for k, z in ((1, 0.0), (1, 5.0), (2, 9.0), (3, 0.0))] == [
         2.0, 5.0, 7.0, 4.0,
     ]  # fmt: skip
 
 
-def test_after_the_last_waypoint_the_leg_goes_on_level():
+def test_last_leg_continues_on_level():
     waypoints = path([[0.0, 0.0, 2.0], [30.0, 40.0, 9.0]])
     line = los.leg(waypoints, 2)
     assert (line.begin, line.elevation) == ((30.0, 40.0, 9.0), 0.0)
@@ -330,7 +330,7 @@ def test_observer_has_the_stated_poles():
             assert desired.angle == pytest.approx(exact, abs=3e-4)
 
 
-def test_rate_is_that_of_a_ramp():
+def test_rate_of_a_ramp_is_its_slope():
     """By its exact discretisation a little more, a / (1 - exp(-a)) with a = h / T_f."""
     desired, K_f, h = Angle(0.0, 0.0), 0.5, 0.01
     for i in range(6000):
