@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from math import asin, pi, tan
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from auv_fmu import simulate
 from orchestrator.commands.main import main
+from orchestrator.cosim import PortName
+from orchestrator.machine.errors import InputError
 from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.scenario import read_scenario
 from orchestrator.vehicle.cautions import follows_vehicle
@@ -108,3 +111,18 @@ def test_remarks_say_these_numbers():
         "los-remus": ("2.95 m", "(2.65 to 3.30 m", "0.24 m (0.11 to 0.38 m)"),
     }.items():
         assert all(number in read_scenario(scenario).remark for number in wanted)
+
+
+def test_waypoints_come_from_a_table(workplace):
+    """Columns x, y, z, as for PathPlanner; it has no times."""
+    Path("path.csv").write_text("x,y,z\n0,0,1\n30,0,2\n30,40,3\n")
+    scenario = (
+        'only = ["planner"]\n[components]\nplanner = "LosGuidance"\n[path]\nfile = "path.csv"\n'
+    )
+    Path("mine.toml").write_text(scenario)
+    system = load_scenario("mine.toml")[1]
+    names = ("count", "waypoint[3].x", "waypoint[3].y", "waypoint[3].z")
+    assert [system.value(PortName("planner", name)) for name in names] == [3, 30.0, 40.0, 3.0]
+    Path("path.csv").write_text("t,x,y,z\n0,0,0,1\n9,30,0,2\n")
+    with pytest.raises(InputError, match="timed"):
+        load_scenario("mine.toml")
