@@ -4,6 +4,7 @@
 `accuracy`     the tables of docs/explanation/accuracy.md: effect of the step on the scenarios
 `noise`        effect of 1 mm of noise: README, reproduction.md, and remarks of scenarios
 `seeds`        effect of random seas, links and noise: remarks of scenarios, and their pages
+`guidance`     docs/explanation/guidance.md: errors across the path with each law, over seeds
 `remus`        docs/explanation/remus.md: changes of `remus` and `remus-pd`, and steady turns
 `bluerov`      docs/explanation/bluerov2.md: changes of `bluerov` and `bluerov-pd`, steady speeds
 `networks`     docs/tutorials/your-own-component.md: deviation of networks from onnxruntime
@@ -501,7 +502,12 @@ SPANS: Mapping[str, Sequence[tuple[float, float]]] = {
     "remus": [(120, 281)],
     "bluerov": [(0, 20), (20, 50), (65, 71)],
     "remus-prestero": [(50, 281)],
+    "los": [(60, 90), (190, 221)],
+    "los-remus": [(90, 120), (330, 361)],
 }
+
+#: Scenarios with guidance: :func:`guidance` prints their numbers.
+GUIDED = ("los", "los-remus")
 
 #: Runs without randomness.
 EVEN: Mapping[str, tuple[str, Values]] = {
@@ -559,14 +565,27 @@ def over_seeds(
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 
+def print_seeds(found: Mapping[str, np.ndarray]) -> None:
+    """Print numbers of a run, and their median and quantiles over those with other seeds."""
+    for name, (own, *others) in found.items():
+        low, middle, high = np.percentile(others, (5, 50, 95))
+        some = f"; not 0 in {100 * np.mean(np.array(others) > 0):.0f} %" * ("%" in name)
+        print(f"  {name:45}{own:8.3f};{middle:8.3f} ({low:.3f} to {high:.3f}){some}")
+
+
+def guidance(*, n: int = 60) -> None:
+    """Print the scenarios with guidance, with each law, own seeds and n others."""
+    for scenario, law in product(GUIDED, ("proportional", "integral", "adaptive")):
+        print(f"\n{scenario}, {law}: own seeds; median (5 % to 95 %)")
+        print_seeds(over_seeds(scenario, False, n, {"planner.law": law}))
+
+
 def seeds(*scenarios: str, n: int = 60) -> None:
     """Print the run with the scenario's own seeds and n others, with either controller."""
-    for scenario, pd in product(scenarios or SPANS, (False, True)):
+    every = [scenario for scenario in SPANS if scenario not in GUIDED]
+    for scenario, pd in product(scenarios or every, (False, True)):
         print(f"\n{scenario}, {'PD' if pd else 'proposed'}: own seeds; median (5 % to 95 %)")
-        for name, (own, *others) in over_seeds(scenario, pd, n).items():
-            low, middle, high = np.percentile(others, (5, 50, 95))
-            some = f"; not 0 in {100 * np.mean(np.array(others) > 0):.0f} %" * ("%" in name)
-            print(f"  {name:45}{own:8.3f};{middle:8.3f} ({low:.3f} to {high:.3f}){some}")
+        print_seeds(over_seeds(scenario, pd, n))
         if scenario in EVEN:
             what, values = EVEN[scenario]
             even = over_seeds(scenario, pd, 0, values)
@@ -1362,6 +1381,7 @@ PAGES: Mapping[str, Callable[..., int | None]] = {
         accuracy,
         noise,
         seeds,
+        guidance,
         remus,
         bluerov,
         networks,

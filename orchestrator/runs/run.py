@@ -53,7 +53,13 @@ from orchestrator.runs.request import (
     takes_keywords,
 )
 from orchestrator.runs.result import FILES, Result, Stopwatch, write_record
-from orchestrator.vehicle.cautions import Watch, cautions, cautions_beside, values_of
+from orchestrator.vehicle.cautions import (
+    Watch,
+    cautions,
+    cautions_beside,
+    follows_vehicle,
+    values_of,
+)
 from orchestrator.vehicle.indices import Metrics
 from orchestrator.vehicle.proof import CertificatesFile
 from orchestrator.vehicle.signals import suffixes
@@ -204,7 +210,9 @@ class WrittenRun:
         """Warn of its events and rows; `first` is the run that it is compared with."""
         if not self.ending.failure:
             yield from (f"did not happen: {event}" for event in self.prepared.missed(self.ending))
-        yield from cautions_beside(self.seen, first.name, first.seen, first.prepared.loops)
+        system = first.prepared.system
+        loops = [loop for loop in first.prepared.loops if not follows_vehicle(system, loop)]
+        yield from cautions_beside(self.seen, first.name, first.seen, loops)
         yield from (caution.text for caution in self._watch.found())
 
     def write_ends(self, command: Sequence[str], clock: Stopwatch) -> None:

@@ -429,7 +429,8 @@ def path_parameters(path: Path, component: str) -> dict[PortName, Any]:
                 f"it has {len(waypoints)} waypoints, and a path has 2 to {MOST}; with a column t, "
                 f'longer tables are tracks: planner = "{path.name}" under [components]'
             )
-    values: dict[str, Any] = {"count": len(waypoints), "timed": "t" in names}
+    # A planner without times has no parameter of the name.
+    values: dict[str, Any] = {"count": len(waypoints), **({"timed": True} if "t" in names else {})}
     for number, waypoint in enumerate(waypoints, start=1):
         values |= {f"waypoint[{number}].{name}": value for name, value in waypoint.items()}
     return {PortName(component, port): value for port, value in values.items()}

@@ -29,7 +29,8 @@ class PathTable(TomlTable):
         '"path.csv"',
     )
     component: str = entry(
-        "The [PathPlanner](../../fmus/path_planner/page.md) whose parameters they become.",
+        "The [PathPlanner](../../fmus/path_planner/page.md), or [LosGuidance]"
+        "(../../fmus/los_guidance/page.md), whose parameters they become.",
         f"`{STANDARD.planner}`",
     )
 
@@ -181,7 +182,7 @@ class ScenarioFile(TomlTable):
         '`"controller.K1[1]" = 12.0`.',
         "the FMUs' own",
     )
-    path: PathTable = entry("Waypoints of a PathPlanner, from a table: [see below](#path).", "none")
+    path: PathTable = entry("Waypoints of a planner, from a table: [see below](#path).", "none")
     events: list[EventTable] = entry(
         "Events during the run, each as `[[events]]`: [see below](#events).", "none"
     )

@@ -250,6 +250,14 @@ class Watch:
         ]
 
 
+def follows_vehicle(system: System, loop: Loop) -> bool:
+    """Return True if the reference depends on where the vehicle is, as with guidance."""
+    if loop.planner not in system.components:
+        return False
+    wires = system.reaching(loop.planner, until={loop.vehicle})
+    return any(wire.source.component == loop.vehicle for wire in wires)
+
+
 def cautions_beside(
     table: Table, name: str, other: Table, loops: Sequence[Loop] = (STANDARD,)
 ) -> list[str]:

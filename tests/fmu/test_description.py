@@ -196,9 +196,10 @@ def test_terminals_are_the_groups_of_inputs_and_outputs(fmi3: Path):
     causality = {variable.name: variable.causality for variable in description.modelVariables}
     joined = []
     for name, (_, members) in terminals(description.modelName).items():
-        assert len({causality[variable] for variable in members.values()}) == 1
-        # Friction takes the velocity through the water, by its own name for it.
-        group = "nu" if description.modelName == "DisturbanceGenerator" and name == "nu_r" else name
+        (side,) = {causality[variable] for variable in members.values()}
+        # Friction and autopilots take the velocity through the water, by their own name for it.
+        takes = side == "input" and description.modelName in ("DisturbanceGenerator", "Autopilot")
+        group = "nu" if takes and name == "nu_r" else name
         for member, variable in members.items():
             # A scalar is a group of its own.
             scalar = (group,) if member == group else ()

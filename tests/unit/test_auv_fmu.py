@@ -16,6 +16,8 @@ import pytest
 import auv_fmu
 import orchestrator
 from auv_fmu.guidance import formation
+from auv_fmu.guidance.autopilot import Vertical
+from auv_fmu.guidance.los import Law
 from auv_fmu.paper import control_point, euler, plant
 from auv_fmu.paper.observer import EULER
 from auv_fmu.paper.saturation import Saturation
@@ -32,6 +34,10 @@ SECTION_4_1 = {
     "Vehicle": {
         "m11": 25.0, "m22": 17.5, "m33": 30.0, "m55": 22.5, "m66": 15.0, "d11": 30.0, "d22": 30.0,
         "d33": 30.0, "d55": 20.0, "d66": 20.0, "righting_pitch": 5.0,
+    },
+    "Model": {
+        "m11": 25.0, "m55": 22.5, "m66": 15.0, "d11": 30.0, "d55": 20.0, "d66": 20.0,
+        "righting_pitch": 5.0,
     },
     "RollAxis": {"m44": 22.5, "d44": 20.0},
     "Limits": {"tau_min": (-80.0,) * 3, "tau_max": (80.0,) * 3},
@@ -66,6 +72,19 @@ OURS = {
         "rounding": 6.0,
     },
     "Follower": {"speed_max": 2.5, "turn_max": 4.0},
+    "Path": {
+        "n": 4,
+        "x": (0.0, 100.0, 100.0, 0.0, *(0.0,) * 28),
+        "y": (0.0, 0.0, 20.0, 20.0, *(0.0,) * 28),
+        "z": (2.0, 10.0, 10.0, 10.0, *(0.0,) * 28),
+    },
+    "los.Parameters": {
+        "law": Law.ADAPTIVE, "Delta_h": 5.0, "Delta_v": 5.0, "kappa": 0.25, "gamma_h": 0.01,
+        "gamma_v": 0.01, "crab_max": 0.5, "K_f": 1.0, "radius": 3.0, "speed": 1.0,
+    },
+    "Model": {"d11_quadratic": 0.0},
+    "Poles": {"omega": 1.0, "zeta": 1.0},
+    "autopilot.Parameters": {"vertical": Vertical.DEPTH, "theta_max": 0.5},
     "Waves": {
         "spectrum": Spectrum.JONSWAP, "Hs": 1.0, "Tp": 7.0, "gamma": 3.3, "highest": 4.0,
         "direction": 0.0, "s": 10.0, "n": 32, "seed": 1,

@@ -65,13 +65,20 @@ _SHORTEST = 1e-6
 _AT_REST: Vector3 = (0.0, 0.0, 0.0)
 
 
+#: Number of waypoints, and their places.
+Count = Annotated[
+    int, Variable("1", "Number of waypoints; later ones are not used", 2, MOST, name="count")
+]
+North = Annotated[Vector32, Variable("m", "North of the waypoint (x)", name="waypoint[{}].x")]
+East = Annotated[Vector32, Variable("m", "East of the waypoint (y)", name="waypoint[{}].y")]
+Down = Annotated[Vector32, Variable("m", "Depth of the waypoint (z)", name="waypoint[{}].z")]
+
+
 class Waypoints(NamedTuple):
     """Waypoints and times; the defaults are a small survey near the vehicle of Fig. 4."""
 
-    n: Annotated[
-        int, Variable("1", "Number of waypoints; later ones are not used", 2, MOST, name="count")
-    ] = 6
-    x: Annotated[Vector32, Variable("m", "North of the waypoint (x)", name="waypoint[{}].x")] = (
+    n: Count = 6
+    x: North = (
         3.0,
         15.0,
         15.0,
@@ -80,7 +87,7 @@ class Waypoints(NamedTuple):
         15.0,
         *_UNUSED,
     )
-    y: Annotated[Vector32, Variable("m", "East of the waypoint (y)", name="waypoint[{}].y")] = (
+    y: East = (
         6.0,
         6.0,
         10.0,
@@ -89,7 +96,7 @@ class Waypoints(NamedTuple):
         14.0,
         *_UNUSED,
     )
-    z: Annotated[Vector32, Variable("m", "Depth of the waypoint (z)", name="waypoint[{}].z")] = (
+    z: Down = (
         0.0,
         4.0,
         4.0,

@@ -218,7 +218,6 @@ def parameters(path: Path, text: str) -> dict[str, object]:
 def test_waypoints_without_times_are_passed_at_the_cruise_speed(tmp_path: Path, text: str):
     assert parameters(tmp_path / "path.csv", text) == {
         "planner.count": 2,
-        "planner.timed": False,
         "planner.waypoint[1].x": 1.0,
         "planner.waypoint[1].y": 2.0,
         "planner.waypoint[1].z": 3.0,
