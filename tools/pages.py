@@ -106,6 +106,7 @@ _GROUPS = {
     "laws": {
         "pd_plus": "sampled, no state, groups of parameters",
         "pid_law": "sampled, filter memory, `derive`",
+        "super_twisting": "sampled, `copysign`, a name for a type",
     },
     "estimators": {
         "complementary_filter": "`atan2`, several inputs, exact step",

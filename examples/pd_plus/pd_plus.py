@@ -2,7 +2,7 @@
 
     F = M ddy_d + D dy_d - K_p e - K_d de,  e = y - y_d, limited to what tau_max allows
 
-The law is that of Paden and Panja, Globally asymptotically stable 'PD+' controller for robot
+See Paden and Panja, Globally asymptotically stable 'PD+' controller for robot
 manipulators, International Journal of Control 47 (1988), with the inertia and, as its further term,
 the drag of the vehicle as a mass at its control point (`auv_fmu.paper.point_mass`). Their Coriolis
 term is left out, because the law has no body rates. Where the model is right, the error obeys

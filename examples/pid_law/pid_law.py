@@ -3,7 +3,7 @@
     e = y - y_d,  s = (dy - dy_d) / (1 + T_f p),  p = d/dt
     F = -K_p e - K_d s + M i, limited to what tau_max allows,  di/dt = -omega^2 / T_i e
 
-s comes from y alone: dy / (1 + T_f p) = (y - y_f) / T_f with T_f dy_f/dt = y - y_f. The gains place
+Only y gives s: dy / (1 + T_f p) = (y - y_f) / T_f with T_f dy_f/dt = y - y_f. The gains place
 the poles of a mass M with drag D (`auv_fmu.paper.point_mass`), as in Fossen, Handbook of Marine
 Craft Hydrodynamics and Motion Control, 2021, section 15.3:
 

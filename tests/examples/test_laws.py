@@ -180,3 +180,23 @@ def test_pd_plus_has_the_error_of_its_poles() -> None:
     assert np.array(seen) == pytest.approx(
         (e + (de + omega * e) * t) * np.exp(-omega * t), abs=2e-3
     )
+
+
+@pytest.mark.parametrize("h", [2e-3, 1e-3])
+def test_super_twisting_reaches_its_surface_in_finite_time_and_stays(h: float) -> None:
+    """Under a disturbance with |dw/dt| < L; of the order of h^2, as Levant (1993) proves."""
+    L, c = 0.5, 1.0
+
+    def w(t: float) -> Any:
+        """Disturbance in the earth frame [m/s2]."""
+        return np.array([0.4 * np.sin(t), 0.3 - 0.2 * np.sin(2.0 * t), 0.45 * np.cos(t)])
+
+    loop = Loop("super_twisting", [0.5, 0.0, -0.3], [0.0, 0.5, 0.4], L=L, c=c)
+    late = []
+    while loop.t < 10.0:
+        loop.step(still, h, MASS * (R.T @ w(loop.t)))
+        if loop.t > 5.0:
+            s = R @ loop.v + c * loop.y
+            late.append(np.abs([*(s / (L * h * h)), *((loop.state.v + Vector(w(loop.t))) / L / h)]))
+    # In units of L h^2 and of L h: numbers of the order of one, for each h.
+    assert np.max(late) < 10.0

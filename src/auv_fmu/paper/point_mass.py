@@ -25,7 +25,7 @@ ZERO = Vector((0.0, 0.0, 0.0))
 
 
 class PointMass(NamedTuple):
-    """What a law knows of its vehicle; the default values are those of Fig. 4."""
+    """Vehicle in the eyes of a law, by default that of Fig. 4."""
 
     mass: Annotated[
         Vector,
