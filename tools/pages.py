@@ -104,6 +104,7 @@ _GROUPS = {
         "waypoint_guidance": "matrix as parameter, `derive`, internal steps",
     },
     "laws": {
+        "backstepping": "sampled, a shared function, `derive`",
         "pd_plus": "sampled, no state, groups of parameters",
         "pid_law": "sampled, filter memory, `derive`",
         "super_twisting": "sampled, `copysign`, a name for a type",

@@ -200,3 +200,28 @@ def test_super_twisting_reaches_its_surface_in_finite_time_and_stays(h: float) -
             late.append(np.abs([*(s / (L * h * h)), *((loop.state.v + Vector(w(loop.t))) / L / h)]))
     # In units of L h^2 and of L h: numbers of the order of one, for each h.
     assert np.max(late) < 10.0
+
+
+def test_backstepping_has_the_energy_of_its_proof() -> None:
+    """V falls at its rate, with a constant disturbance, and all errors vanish."""
+    k_1, k_2, gamma, h = 0.8, 1.5, 0.6, 2e-3
+    w = R @ [0.3, -0.2, 0.1]
+    loop = Loop("backstepping", [1.5, 1.0, 1.5], [0.5] * 3, k_1=k_1, k_2=k_2, gamma=gamma)
+
+    def energies() -> tuple[float, float]:
+        """V and dV/dt now."""
+        y_d, dy_d, _ = moving(loop.t)
+        z_1 = loop.y - y_d
+        z_2 = R @ loop.v - dy_d + k_1 * z_1
+        wrong = w - (0.0 if loop.state is None else np.array(loop.state.w))
+        V = (k_1 * k_2 * z_1 @ z_1 + z_2 @ z_2 + wrong @ wrong / gamma) / 2.0
+        return V, -(k_1**2) * k_2 * z_1 @ z_1 - k_2 * z_2 @ z_2
+
+    seen = [energies()]
+    for _ in range(10_000):
+        loop.step(moving, h, MASS * (R.T @ w))
+        seen.append(energies())
+    V, rate = np.transpose(seen)
+    # The sampled loop is half a step late.
+    assert np.diff(V) / h == pytest.approx(rate[:-1], abs=0.005 * V[0])
+    assert V[-1] < 1e-4 * V[0]
