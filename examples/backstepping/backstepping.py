@@ -31,7 +31,7 @@ SAMPLED = True
 STOP_TIME = 10.0
 
 #: Gains to tune, with their ranges.
-GAINS = {"k_1": (0.2, 3.0), "k_2": (0.2, 5.0), "gamma": (0.01, 3.0)}
+GAINS = {"k_1": (0.2, 5.0), "k_2": (0.2, 10.0), "gamma": (0.01, 10.0)}
 
 
 class Parameters(NamedTuple):

@@ -30,7 +30,7 @@ SAMPLED = True
 STOP_TIME = 10.0
 
 #: Gains to tune, with their ranges.
-GAINS = {"omega": (0.2, 4.0), "zeta": (0.5, 2.0)}
+GAINS = {"omega": (0.2, 8.0), "zeta": (0.5, 2.0)}
 
 
 class Parameters(NamedTuple):

@@ -28,7 +28,7 @@ SAMPLED = True
 STOP_TIME = 10.0
 
 #: Gains to tune, with their ranges.
-GAINS = {"omega": (0.2, 4.0), "zeta": (0.5, 2.0), "T_i": (2.0, 100.0), "T_f": (0.02, 0.5)}
+GAINS = {"omega": (0.2, 8.0), "zeta": (0.5, 2.0), "T_i": (2.0, 100.0), "T_f": (0.02, 0.5)}
 
 
 class Parameters(NamedTuple):

@@ -29,7 +29,7 @@ SAMPLED = True
 STOP_TIME = 10.0
 
 #: Gains to tune, with their ranges.
-GAINS = {"c": (0.2, 3.0), "L": (0.003, 3.0)}
+GAINS = {"c": (0.2, 4.0), "L": (0.003, 10.0)}
 
 
 class Parameters(NamedTuple):
