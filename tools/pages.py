@@ -104,6 +104,14 @@ _GROUPS = {
         "pid": "sampled, tunable parameters, `check`",
         "waypoint_guidance": "matrix as parameter, `derive`, internal steps",
     },
+    "laws": {
+        "backstepping": "sampled, a shared function, `derive`",
+        "mrac": "sampled, matrix as state, a state as rate",
+        "pd_plus": "sampled, no state, groups of parameters",
+        "predictive": "sampled, matrices as constants, optimisation",
+        "pid_law": "sampled, filter memory, `derive`",
+        "super_twisting": "sampled, `copysign`, a name for a type",
+    },
     "estimators": {
         "complementary_filter": "`atan2`, several inputs, exact step",
         "extended_kalman_filter": "sampled, `solve`, refusal, `replaced`",
