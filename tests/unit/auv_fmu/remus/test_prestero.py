@@ -196,7 +196,7 @@ def test_a_buoyant_vehicle_rises_as_fast_as_its_buoyancy_balances_its_drag():
 
 
 def test_presteros_vehicle_at_rest_rises_as_his_equations_say():
-    """At 0.23 m/s, nearly as by his drag in heave alone."""
+    """At 0.23 m/s, nearly as by his drag in heave on its own."""
 
     def residual(x):
         u, w, theta = x
