@@ -87,7 +87,17 @@ SMALL_STUDIES = {
 
 #: Scenarios that come first in the gallery, the best first.
 _BEST = (
-    *("fig5", "formation-lost-link", "remus", "sea", "formation-v", "fig4", "fault-sensor", "path"),
+    *(
+        "fig5",
+        "formation-lost-link",
+        "remus",
+        "bluerov",
+        "sea",
+        "formation-v",
+        "fig4",
+        "fault-sensor",
+        "path",
+    ),
     *("current-step", "formation-change", "fig6", "fault-thruster", "fig7a", "fig7b", "fig7c"),
 )
 

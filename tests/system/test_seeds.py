@@ -41,6 +41,14 @@ EXPECTED = {
         "error from 120 s to 280 s [m]": (0.183, 0.182, 0.183),
         "steps beyond the limits, r [%]": (44, 44, 45),
     },
+    ("bluerov", False): {
+        "error from 20 s to 50 s [m]": (0.38, 0.38, 0.38),
+        "peak command u [N]": (32, 32, 33),
+    },
+    ("bluerov", True): {
+        "error from 20 s to 50 s [m]": (0.75, 0.75, 0.75),
+        "peak command u [N]": (33, 33, 33),
+    },
 }
 
 #: Half a unit of the last stated digit.
@@ -77,6 +85,7 @@ def test_remarks_say_these_numbers():
         "sea": ("0.43 m (0.23 to 0.83 m", "0.56 m (0.26 to 1.07 m", "86 N", "46 N", "62 %"),
         "formation-v": ("0.27 m", "0.44 m", "74 N (72 to 77 N", "31 N"),
         "formation-change": ("(0.38 to 0.39 m", "0.56 m"),
+        "bluerov": ("0.38 m", "0.75 m"),
         "formation-lost-link": (
             "1.76 m", "2.23 m", "0.12 m (0.11 to 0.22 m", "0.11 m (0.08 to 0.24 m", "404 N",
             "185 N", "9.6 %", "1.4 %",
