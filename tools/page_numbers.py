@@ -34,7 +34,7 @@ from dataclasses import replace
 from datetime import date
 from functools import partial
 from itertools import pairwise, product
-from math import ceil, cos, exp, log, radians, sin
+from math import ceil, cos, exp, log, radians, sin, sqrt
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -894,7 +894,7 @@ def bluerov() -> None:
 
 def steady_speed(linear: float, quadratic: float, force: float) -> float:
     """The speed at which a drag equals a force [m/s]."""
-    return (-linear + (linear**2 + 4.0 * quadratic * force) ** 0.5) / (2.0 * quadratic)
+    return (sqrt(linear**2 + 4.0 * quadratic * force) - linear) / (2.0 * quadratic)
 
 
 def bluerov_numbers(scenario: str, changes: Values) -> str:

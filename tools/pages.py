@@ -87,9 +87,9 @@ SMALL_STUDIES = {
 
 #: Scenarios that come first in the gallery, the best first.
 _BEST = (
-    *("fig5", "formation-lost-link", "remus", "sea", "formation-v", "fig4", "fault-sensor", "path"),
-    *("los-remus", "los", "current-step", "formation-change", "fig6", "fault-thruster"),
-    *("fig7a", "fig7b", "fig7c"),
+    *("fig5", "formation-lost-link", "remus", "bluerov", "sea", "formation-v", "fig4"),
+    *("fault-sensor", "path", "los-remus", "los", "current-step", "formation-change", "fig6"),
+    *("fault-thruster", "fig7a", "fig7b", "fig7c"),
 )
 
 #: End of the titles of scenarios with two controllers, which the gallery leaves out.

@@ -120,7 +120,8 @@ PLANTS_FIRST: Order = ("plant", "disturbance", "planner", "controller")
 @pytest.mark.parametrize(
     ("name", "order"),
     [("fig4", None), ("path", "feedthrough"), ("remus", "jacobi"),
-     *slow(("fig5-pd", "jacobi"), ("sea", None), ("remus-pd", "feedthrough"))]
+     *slow(("fig5-pd", "jacobi"), ("sea", None), ("remus-pd", "feedthrough"),
+           ("bluerov", "jacobi"))]
 )  # fmt: skip
 def test_every_column_equals_the_fmus(name, order):
     compare_with_fmus(name, Point(0, name, NOISY, 4.01, 0.02, order))

@@ -198,7 +198,7 @@ def test_bluerov2_without_thrust_only_loses_energy(velocity, rates, phi, theta):
 
 
 def test_bluerov2_without_thrust_loses_energy_along_a_run():
-    """A tumble in small steps: kinetic energy, and that of weight and buoyancy, never grow."""
+    """A tumble in small steps: kinetic and potential energy together never grow."""
     body = bluerov2.Body(volume=0.0135)
     nu0 = (1.0, -0.5, 0.3, 4.0, -3.0, 5.0)
     vehicle = bluerov2.Parameters(body=body, nu0=nu0)

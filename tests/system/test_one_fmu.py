@@ -31,7 +31,7 @@ from support.tiers import slow
 #: Communication step of the scenarios [s], and how many steps are compared.
 H, STEPS = 0.02, 120
 
-SCENARIOS = ("fig4", "sea", *slow("formation-v", "remus"))
+SCENARIOS = ("fig4", "sea", *slow("formation-v", "remus", "bluerov"))
 
 #: Values for an input that is open in all of these.
 WAVE = "time,plant.water.x\n" + "".join(f"{H * k!r},{0.3 * sin(k)!r}\n" for k in range(STEPS))

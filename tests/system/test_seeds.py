@@ -46,6 +46,14 @@ EXPECTED = {
         "steps beyond the limits, q [%]": (27, 26, 27),
         "steps beyond the limits, r [%]": (4, 4, 5),
     },
+    ("bluerov", False): {
+        "error from 20 s to 50 s [m]": (0.38, 0.38, 0.38),
+        "peak command u [N]": (32, 32, 33),
+    },
+    ("bluerov", True): {
+        "error from 20 s to 50 s [m]": (0.75, 0.75, 0.75),
+        "peak command u [N]": (33, 33, 33),
+    },
 }
 
 #: Half a unit of the last stated digit.
@@ -83,6 +91,7 @@ def test_remarks_say_these_numbers():
         "formation-v": ("0.27 m", "0.44 m", "74 N (72 to 77 N", "31 N"),
         "formation-change": ("(0.38 to 0.39 m", "0.56 m"),
         "remus-prestero": ("0.34 m at most (0.32 to 0.36 m", "0.30 m"),
+        "bluerov": ("0.38 m", "0.75 m"),
         "formation-lost-link": (
             "1.76 m", "2.23 m", "0.12 m (0.11 to 0.22 m", "0.11 m (0.08 to 0.24 m", "404 N",
             "185 N", "9.6 %", "1.4 %",
