@@ -51,7 +51,8 @@ def both(
 
 
 @pytest.mark.parametrize(
-    "scenario", ["fig3b", "path", "sea", "remus-pd", "remus-prestero", "formation-lost-link"]
+    "scenario",
+    ["fig3b", "path", "sea", "remus-pd", "remus-prestero", "formation-lost-link", "los", "los-remus"],
 )
 def test_scenario_is_the_same(dist: Path, native: Path, scenario: str):
     both(dist, native, scenario, Experiment(2.0, STEP))
@@ -75,6 +76,8 @@ def test_scenario_is_the_same_to_its_end(dist: Path, native: Path, scenario: str
         ("fig4", {"controller.saturation": "arctan", "controller.observer": "exact"}),
         ("fig5-pd", {"plant.roll": False, "plant.actuator.T.q": 0.1, "plant.noise.std": 0.0}),
         ("fig4", {"plant.current.x": 0.2, "plant.current.z": -0.1, "planner.nu0.u": 0.2}),
+        ("los", {"planner.law": "adaptive", "planner.waypoint[2].x": 4.0, "plant.eta0.psi": 3.0}),
+        ("los-remus", {"planner.law": "integral", "controller.vertical": "depth"}),
         ("fig5-pd", {"plant.actuator.T.u": 0.5, "plant.actuator.T.r": 0.001}),
         ("fig5", {"plant.integrator": "rk4", "plant.current.y": 0.1, "plant.actuator.T.r": 0.1}),
         ("fig5-pd", {"plant.integrator": "rk4", "plant.roll": False}),

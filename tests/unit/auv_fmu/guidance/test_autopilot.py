@@ -48,7 +48,7 @@ def test_law_agrees_with_python_vehicle_simulator():
         gains = of_angle(row["m"], row["d"], row["k"], Poles(row["wn"], row["zeta"]))
         u = -gains.p * row["e_x"] - gains.d * row["e_v"] - gains.i * row["e_int"]
         expected = row["u"] - 0.1 * row["wn"] * row["k"] * row["e_int"]
-        assert u == pytest.approx(expected, rel=1e-12, abs=1e-10)
+        assert u == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
 def closed_loop(rates, n: int) -> np.ndarray:

@@ -123,7 +123,7 @@ def test_observer_agrees_with_mss():
         for angle, scaled, commanded, h, K_f, *results in table()["LOSobserver", run]:
             after = los.observe(K_f, Angle(angle, angle - scaled), commanded, h)
             found = [after.angle, los.lag(K_f) * los.rate(K_f, after)]
-            assert found == pytest.approx(results, rel=1e-12, abs=4e-12)
+            assert found == pytest.approx(results, **CLOSE)
 
 
 def test_errors_agree_with_mss():
@@ -139,7 +139,7 @@ def test_errors_agree_with_mss():
         end, begin, place, result = (values[i : i + 3] for i in (0, 3, 6, 9))
         line = los.leg(path([begin, end]), 1)
         e = los.errors(line, tuple(place))
-        assert e[1] == pytest.approx(result[1], rel=1e-12, abs=1e-10)
+        assert e[1] == pytest.approx(result[1], **CLOSE)
         away = hypot(*np.subtract(place, begin))
         assert hypot(*e) == pytest.approx(away)
         assert hypot(*result) != pytest.approx(away, abs=1e-3)
