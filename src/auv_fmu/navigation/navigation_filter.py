@@ -23,10 +23,12 @@ G, which are velocity, position and attitude integrated from the IMU without cor
 the age, and "then" for the time of the sample:
 
     p_then = p - d (v - V) - (W - W_then),   v_then = v - (V - V_then),   q_then = q G^-1 G_then
-    dp_then = dp - d dv - [v d - (p - p_then) - g d^2 / 2]x dtheta
-    dv_then = dv + [v - v_then - g d]x dtheta,   dtheta_then = dtheta
+    dp_then = dp - d dv - [v d - (p - p_then) - g d^2 / 2]x dtheta - d^2 / 2 R da_b
+    dv_then = dv + [v - v_then - g d]x dtheta + d R da_b
+    dtheta_then = dtheta + d R domega_b
 
-That is exact but for the noise and the biases of the IMU within the age.
+That is exact but for the noise of the IMU within the age, and for what its biases do there while
+the vehicle turns.
 """
 
 from __future__ import annotations
@@ -79,6 +81,9 @@ from auv_fmu.paper.control_point import ELL, Distance, control_point, control_po
 
 #: Number of error states, and of those of position, velocity and attitude.
 SIZE, SHOWN = 15, 9
+
+#: Most numbers in a measurement.
+MOST = 10
 
 #: Numbers in the lower triangle of the covariance that is shown.
 TRIANGLE = SHOWN * (SHOWN + 1) // 2
@@ -173,13 +178,21 @@ class FilterState(NamedTuple):
     newest: int  #: place of the newest moment in the memory
 
 
+class Measurement(NamedTuple):
+    """All numbers that have arrived in a step; the first n rows count."""
+
+    H: Annotated[Matrix, MOST, SIZE]  #: their Jacobian
+    innovation: Annotated[Vector, MOST]  #: the numbers less their predictions
+    std: Annotated[Vector, MOST]  #: standard deviations of their noises
+    n: int
+
+
 class Correction(NamedTuple):
     """Estimate of the error, and how well the samples agree with the prediction."""
 
     P: Annotated[Matrix, SIZE, SIZE]
     dx: Annotated[Vector, SIZE]
     nis: float  #: normalised innovation squared
-    dof: int  #: its degrees of freedom
 
 
 class Then(NamedTuple):
@@ -190,6 +203,7 @@ class Then(NamedTuple):
     position: Vector3
     velocity: Vector3
     attitude: Vector4
+    axes: Rotation  #: rows of R at present, the earth axes in the body frame
 
 
 class Filtered(NamedTuple):
@@ -306,9 +320,10 @@ def advance(parameters: Parameters, state: FilterState, samples: Samples, t: flo
     if h > 0.0:
         state = predicted(parameters, state, samples.imu, h)
         state = remembered(parameters, state, t)
-    found = corrections(parameters, state, samples, h > 0.0)
-    state = state._replace(nominal=injected(state.nominal, found.dx), P=found.P)
-    return Filtered(state, rate, found.nis, found.dof)
+    found = measurement(parameters, state, samples, h > 0.0)
+    P, dx, nis = correction(state.P, found)
+    state = state._replace(nominal=injected(state.nominal, dx), P=P)
+    return Filtered(state, rate, nis, found.n)
 
 
 def predicted(
@@ -401,8 +416,10 @@ def then(state: FilterState, age: float) -> Then:
 
     """
     position, velocity, attitude, _, _ = state.nominal
+    a, b, c = rotation_from_quaternion(attitude)
+    axes = (a[0], b[0], c[0]), (a[1], b[1], c[1]), (a[2], b[2], c[2])
     if age <= _MOMENT:
-        return Then(True, 0.0, position, velocity, attitude)
+        return Then(True, 0.0, position, velocity, attitude, axes)
     time = state.t - age
     newer, older = moment(state.t, state.path), state.memory[state.newest]
     k = 1
@@ -411,7 +428,7 @@ def then(state: FilterState, age: float) -> Then:
         older = state.memory[(state.newest - k) % MOMENTS]
         k = k + 1
     if older[0] > time + _MOMENT:
-        return Then(False, age, position, velocity, attitude)
+        return Then(False, age, position, velocity, attitude, axes)
     between = newer[0] - older[0]
     share = (time - older[0]) / between if between > 0.0 else 0.0
     mean = older + share * (newer - older)
@@ -423,13 +440,14 @@ def then(state: FilterState, age: float) -> Then:
         sub(add_scaled(position, -age, sub(velocity, state.path.V)), sub(state.path.W, W)),
         sub(velocity, sub(state.path.V, V)),
         product(attitude, back),
+        axes,
     )
 
 
-def corrections(
+def measurement(
     parameters: Parameters, state: FilterState, samples: Samples, later: bool
-) -> Correction:
-    """Estimate of the error from all samples that have arrived.
+) -> Measurement:
+    """All numbers that have arrived, linear about the prediction.
 
     Args:
         parameters: of the filter.
@@ -439,55 +457,45 @@ def corrections(
 
     """
     noise, nominal = parameters.noise, state.nominal
-    found = Correction(state.P, Vector((0.0,) * SIZE), 0.0, 0)
+    zero = Vector((0.0,) * MOST)
+    found = Measurement(Matrix((0.0 for j in range(SIZE)) for i in range(MOST)), zero, zero, 0)
     if samples.attitude.fresh and later:
         past = then(state, samples.attitude.age)
-        if past.known:
-            phi, theta, psi = samples.attitude.eta
-            measured = quaternion_from_euler(phi, theta, psi)
-            turn = logarithm(product(measured, inverse(past.attitude)))
-            std = (noise.tilt, noise.tilt, noise.heading)
-            for k in range(3):
-                found = corrected(found, row(_ZERO, _ZERO, _AXES[k]), turn[k], std[k])
+        phi, theta, psi = samples.attitude.eta
+        attitude = quaternion_from_euler(phi, theta, psi)
+        turn = logarithm(product(attitude, inverse(past.attitude)))
+        std = (noise.tilt, noise.tilt, noise.heading)
+        for k in range(3):
+            H = row(_ZERO, _ZERO, _AXES[k], _ZERO, scale(past.age, past.axes[k]))
+            found = noted(found, past, H, turn[k], std[k])
     if samples.depth.fresh:
         past = then(state, samples.depth.age)
-        if past.known:
-            found = corrected(
-                found,
-                position_row(nominal, past, 2),
-                samples.depth.z - past.position[2],
-                noise.depth,
-            )
+        H = position_row(nominal, past, 2)
+        found = noted(found, past, H, samples.depth.z - past.position[2], noise.depth)
     if samples.dvl.fresh:
         past = then(state, samples.dvl.age)
-        if past.known:
-            rotation = rotation_from_quaternion(past.attitude)
-            expected = rotate_back(rotation, past.velocity)
-            v_x, v_y, v_z = nominal.velocity
-            velocity = (v_x, v_y, v_z - past.age * GRAVITY)
-            for k in range(3):
-                found = corrected(
-                    found,
-                    row(_ZERO, rotation[k], cross(rotation[k], velocity)),
-                    samples.dvl.nu[k] - expected[k],
-                    noise.velocity,
-                )
+        rotation = rotation_from_quaternion(past.attitude)
+        expected = rotate_back(rotation, past.velocity)
+        v_x, v_y, v_z = nominal.velocity
+        velocity = (v_x, v_y, v_z - past.age * GRAVITY)
+        for k in range(3):
+            turn = cross(rotation[k], velocity)
+            H = row(_ZERO, rotation[k], turn, scale(past.age, _AXES[k]), _ZERO)
+            found = noted(found, past, H, samples.dvl.nu[k] - expected[k], noise.velocity)
     if samples.fix.fresh and later:
         past = then(state, samples.fix.age)
-        if past.known:
-            for k in range(3):
-                found = corrected(
-                    found,
-                    position_row(nominal, past, k),
-                    samples.fix.position[k] - past.position[k],
-                    noise.position[k],
-                )
+        for k in range(3):
+            H = position_row(nominal, past, k)
+            innovation = samples.fix.position[k] - past.position[k]
+            found = noted(found, past, H, innovation, noise.position[k])
     return found
 
 
-def row(position: Vector3, velocity: Vector3, turn: Vector3) -> Vector:
-    """A row of the Jacobian of a measurement, which no bias enters."""
-    return Vector((*position, *velocity, *turn, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+def row(
+    position: Vector3, velocity: Vector3, turn: Vector3, force: Vector3, rate: Vector3
+) -> Vector:
+    """A row of the Jacobian of a measurement."""
+    return Vector((*position, *velocity, *turn, *force, *rate))
 
 
 def position_row(nominal: Nominal, past: Then, k: int) -> Vector:
@@ -496,30 +504,51 @@ def position_row(nominal: Nominal, past: Then, k: int) -> Vector:
     moved = sub(nominal.position, past.position)
     x, y, z = sub(scale(age, nominal.velocity), moved)
     turn = cross((x, y, z - 0.5 * age * age * GRAVITY), axis)
-    return row(axis, scale(-age, axis), turn)
+    force = scale(-0.5 * age * age, past.axes[k])
+    return row(axis, scale(-age, axis), turn, force, _ZERO)
 
 
-def corrected(found: Correction, H: Vector, innovation: float, std: float) -> Correction:
-    """A better estimate of the error, from one more number.
+def noted(found: Measurement, past: Then, H: Vector, innovation: float, std: float) -> Measurement:
+    """A measurement with one more number, unless the filter does not remember its time.
 
     Args:
-        found: the estimate before.
-        H: Jacobian of the number.
+        found: the measurement before.
+        past: state at the time of the number.
+        H: its Jacobian.
         innovation: the number less its prediction.
         std: standard deviation of its noise.
 
     """
-    P = found.P
-    PH = P @ H
-    variance = H @ PH + std * std
-    rest = innovation - H @ found.dx
-    w = PH / sqrt(variance)
-    return Correction(
-        Matrix((P[i, j] - w[i] * w[j] for j in range(SIZE)) for i in range(SIZE)),
-        found.dx + (rest / variance) * PH,
-        found.nis + rest * rest / variance,
-        found.dof + 1,
+    if not past.known:
+        return found
+    n = found.n
+    return Measurement(
+        found.H.replaced(n, H),
+        found.innovation.replaced(n, innovation),
+        found.std.replaced(n, std),
+        n + 1,
     )
+
+
+def correction(P: Matrix, found: Measurement) -> Correction:
+    """Estimate of the error from a measurement, applied number by number.
+
+    Args:
+        P: covariance of the predicted error.
+        found: the measurement.
+
+    """
+    dx, nis = Vector((0.0,) * SIZE), 0.0
+    for k in range(found.n):
+        H, std = found.H[k], found.std[k]
+        PH = P @ H
+        variance = H @ PH + std * std
+        rest = found.innovation[k] - H @ dx
+        w = PH / sqrt(variance)
+        P = Matrix((P[i, j] - w[i] * w[j] for j in range(SIZE)) for i in range(SIZE))
+        dx = dx + (rest / variance) * PH
+        nis = nis + rest * rest / variance
+    return Correction(P, dx, nis)
 
 
 def injected(nominal: Nominal, dx: Vector) -> Nominal:

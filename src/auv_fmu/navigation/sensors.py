@@ -13,7 +13,7 @@ from math import radians, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.language.arrays import Vector
-from auv_fmu.language.quantities import ACCELERATION, EULER, NU, POSITION, VELOCITY, Members
+from auv_fmu.language.quantities import ACCELERATION, EULER, NU, POSITION, Members
 from auv_fmu.language.variable import Variable
 from auv_fmu.language.vectors import Vector3, Vector4, scale, sub
 from auv_fmu.navigation.rotations import exponential, inverse, logarithm, product
