@@ -134,7 +134,8 @@ def is_due(sampling: Sampling, state: SampleState, t: float) -> bool:
 def arrived(sampling: Sampling, state: SampleState, t: float) -> SampleState:
     """State after the arrival of all samples until time t [s]."""
     state = state._replace(fresh=False)
-    while state.waiting > 0 and state.queue[state.first, 0] + sampling.delay <= t + _MOMENT:
+    latest, k = t - sampling.delay + _MOMENT, 0
+    while state.waiting > 0 and state.queue[state.first, 0] <= latest and k < PLACES:
         row = state.queue[state.first]
         state = state._replace(
             held=row[1:],
@@ -143,6 +144,7 @@ def arrived(sampling: Sampling, state: SampleState, t: float) -> SampleState:
             first=(state.first + 1) % PLACES,
             waiting=state.waiting - 1,
         )
+        k = k + 1
     return state
 
 
