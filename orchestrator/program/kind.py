@@ -39,6 +39,10 @@ _NOT_FINITE, _UNSOUND, _TOO_MANY = (
 #: Least number of values that a loop checks.
 _MANY = 4
 
+#: Most numbers in a state of a component whose functions are inlined: calls of larger ones take a
+#: small part of their time, and a compiler takes long for many copies of them.
+_MOST_INLINED = 128
+
 #: A number so large that its product with any parameter but zero shows in the outputs.
 _LARGE = 1e300
 
@@ -144,10 +148,16 @@ class Kind:
         return self.emitter.call(called, [known[name] for name in called.arguments])
 
     def _function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
-        macro = "WITHIN" if self.is_alone and name != "start" else "APART"
+        is_inlined = self.is_alone and self._is_small and name != "start"
+        macro = "WITHIN" if is_inlined else "APART"
         head = f"{macro} void {self.name}_{name}({self.name} *it{arguments}, Error *error)"
         names = re.findall(r"(\w+)(?=,|$)", arguments)
         return function(head, lines, ["error", *filter(None, names)])
+
+    @cached_property
+    def _is_small(self) -> bool:
+        """True if its state has few numbers."""
+        return len([*scalars(self.types["state"], "")]) <= _MOST_INLINED
 
     def structure(self) -> str:
         """Return its structure."""
@@ -372,14 +382,25 @@ def _has_gaps(type_: Type) -> bool:
 
 def _of_all(type_: Type, text: str, name: str, term: str, test: str) -> str:
     """Return a test of all floats in a value; empty: there are none."""
+    parts = [*_floats(type_, text)]
+    many = [f"{name}((const double *)&{place}, {n})" for place, n in parts if n > 1]
+    few = [term.format(place) for place, n in parts if n == 1]
+    if name == "are_finite":
+        return " && ".join([*many, *([f"{' + '.join(few)} {test}"] if few else [])])
+    return f"{' + '.join([*many, *few])} {test}" if parts else ""
+
+
+def _floats(type_: Type, text: str) -> Iterator[tuple[str, int]]:
+    """Yield the floats in a value: parts of nothing else and their numbers, and single ones."""
     places = [*scalars(type_, text)]
-    floats = [place.text for place in places if place.type == FLOAT]
-    if not floats:
-        return ""
-    if _MANY <= len(floats) == len(places) and not _has_gaps(type_):
-        called = f"{name}((const double *)&{text}, {len(floats)})"
-        return called if name == "are_finite" else f"{called} {test}"
-    return f"{' + '.join(term.format(text) for text in floats)} {test}"
+    if len(places) >= _MANY and all(place.type == FLOAT for place in places):
+        if not _has_gaps(type_):
+            yield text, len(places)
+            return
+    elif isinstance(type_, Scalar):
+        yield from ((text, 1) for place in places if place.type == FLOAT)
+    for suffix, part in members(type_):
+        yield from _floats(part, text + suffix)
 
 
 class _Mixed(Exception):

@@ -11,19 +11,20 @@ subject.
 The paper is "Three-dimensional tracking control of autonomous underwater vehicles with
 limited torque and without velocity sensors". Equation numbers in this package are its own.
 
-================  ========================================================================
-subpackage        contents
-================  ========================================================================
-:mod:`.language`  elements of equations: declarations, vectors, random numbers
-:mod:`.paper`     the paper's vehicle, reference, disturbance and controllers
-:mod:`.proof`     quantities that only the paper's proof needs; not part of any FMU
-:mod:`.remus`     the REMUS 100, not in the paper
-:mod:`.bluerov2`  the BlueROV2 Heavy, not in the paper
-:mod:`.water`     waves and currents of a sea, not in the paper
-:mod:`.guidance`  paths, tracks, formations and their messages, not in the paper
-:mod:`.loop`      Fig. 2 as straight-line Python, with all of these
-:mod:`.casadi`    components as functions of CasADi; not part of any FMU
-================  ========================================================================
+==================  ======================================================================
+subpackage          contents
+==================  ======================================================================
+:mod:`.language`    elements of equations: declarations, vectors, random numbers
+:mod:`.paper`       the paper's vehicle, reference, disturbance and controllers
+:mod:`.proof`       quantities that only the paper's proof needs; not part of any FMU
+:mod:`.remus`       the REMUS 100, not in the paper
+:mod:`.bluerov2`    the BlueROV2 Heavy, not in the paper
+:mod:`.water`       waves and currents of a sea, not in the paper
+:mod:`.guidance`    paths, tracks, formations and their messages, not in the paper
+:mod:`.navigation`  sensors and the filter that fuses them, not in the paper
+:mod:`.loop`        Fig. 2 as straight-line Python, with all of these
+:mod:`.casadi`      components as functions of CasADi; not part of any FMU
+==================  ======================================================================
 
 Each imports only from those above it, and lists its modules in its own docstring.
 

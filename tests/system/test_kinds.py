@@ -52,7 +52,16 @@ def both(
 
 @pytest.mark.parametrize(
     "scenario",
-    ["fig3b", "path", "sea", "remus-pd", "remus-prestero", "formation-lost-link", "los", "los-remus"],
+    [
+        "fig3b",
+        "path",
+        "sea",
+        "remus-pd",
+        "remus-prestero",
+        "formation-lost-link",
+        "los",
+        "los-remus",
+    ],
 )
 def test_scenario_is_the_same(dist: Path, native: Path, scenario: str):
     both(dist, native, scenario, Experiment(2.0, STEP))

@@ -34,7 +34,7 @@ casadi = pytest.importorskip("casadi")
 FIG4 = SCENARIOS_FOLDER / "fig4.toml"
 
 #: Loops that end where a number says so cannot be unrolled.
-LOOPS = {"AcousticLink", "Sea", "lqr", "stair"}
+LOOPS = {"AcousticLink", "NavigationFilter", "Sea", "lqr", "stair"}
 ALL = [name for name in (*NAMES, *examples.NAMES) if name not in LOOPS]
 
 #: Steps from different states.
