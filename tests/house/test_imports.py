@@ -22,8 +22,8 @@ ROOT = Path(__file__).parents[2]
 #: Rooms, each of which may import those before it.
 FLOORS = {
     "auv_fmu": (
-        "language", "paper", "proof", "remus", "bluerov2", "water", "guidance", "navigation", "loop",
-        "casadi",
+        "language", "paper", "proof", "remus", "bluerov2", "water", "guidance", "navigation",
+        "loop", "casadi",
     ),
     "orchestrator": (
         "machine", "cosim", "vehicle", "figures", "runs", "program", "simulation", "bridges",
