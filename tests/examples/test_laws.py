@@ -143,7 +143,7 @@ def test_error_dies_out_with_the_default_gains(name: str) -> None:
     loop = Loop(name, [3.0, -3.0, 2.5], [0.0, 0.0, 0.0], most=80.0)
     for _ in range(1500):
         loop.step(reference, 0.02)
-    # The integral of PID is slow, and the learned law has none.
+    # The integral of PID is slow, and the learned law lacks one.
     most = 0.06 if name in ("pid_law", "learned_law") else 0.03
     assert np.linalg.norm(loop.error(reference)) < most
 
