@@ -5,9 +5,9 @@
 
 M and D are mass and drag at the control point (`auv_fmu.paper.point_mass`). A plan is for 4 / omega
 seconds, and holds attitude, ddy_d, w and drag; its first move is made. Without limits the best plan
-is K (e, de). Clipped, it begins ROUNDS of the fast gradient method: Richter, Jones and Morari,
-Computational complexity certification for real-time MPC with input constraints, IEEE Transactions
-on Automatic Control 57 (2012). With a velocity o of the model,
+is K (e, de). Clipped, it begins ROUNDS of gradient steps: Richter, Jones and Morari, Computational
+complexity certification for real-time MPC with input constraints based on the fast gradient method,
+IEEE Transactions on Automatic Control 57 (2012). With a velocity o of the model,
 
     w = l (dy - o),  do/dt = R M^-1 (f - D v) + w
 
