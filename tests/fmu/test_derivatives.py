@@ -86,7 +86,8 @@ def test_derivatives_equal_differences(request, tmp_path: Path, name: str, bundl
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in components() if name not in ("AcousticLink", "NavigationFilter", "Sea")]
+    "name",
+    [name for name in components() if name not in ("AcousticLink", "NavigationFilter", "Sea")],
 )
 def test_derivatives_equal_casadis(native: Path, tmp_path: Path, name: str):
     """Another differentiation of the same text, at the start."""

@@ -160,7 +160,9 @@ def flight():
         z = then[1][0][2] + random.normal(0.0, noise.depth)
         nu = then[2][2].inv().apply(then[2][1]) + random.normal(0.0, noise.velocity, 3)
         p = then[3][0] + random.normal(0.0, noise.position)
-        marks = [(float(age) * H, bool(is_fresh)) for age, is_fresh in zip(ages, fresh)]
+        marks = [
+            (float(age) * H, bool(is_fresh)) for age, is_fresh in zip(ages, fresh, strict=True)
+        ]
         yield Samples(
             InertialSample(tuple(map(float, f)), tuple(map(float, w)), 0.0, True),
             AttitudeSample(tuple(map(float, eta)), *marks[0]),

@@ -140,7 +140,7 @@ def test_imu_gives_what_euler_needs_to_restore_the_motion():
     for k in range(1, 60):
         state = imu.derive(parameters, state, motion(h * k), h * k)
         sample = imu.outputs(state, h * k).sample
-        v = v + h * (turn.apply(sample.f) + (0.0, 0.0, 9.81))
+        v = v + h * (turn.apply(sample.f) + np.array((0.0, 0.0, 9.81)))
         turn *= Turn.from_rotvec(h * np.array(sample.omega))
         now = motion(h * k)
         assert v == pytest.approx(velocity(now), abs=1e-12)
