@@ -1,4 +1,4 @@
-"""The navigation filter in the loop is consistent: its errors have the covariance that it states."""
+"""The errors of the navigation filter in the loop have the covariance that it states."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def samples(parameters: Sampling, h: float, n: int, errors: Errors = NONE, start
 @pytest.mark.parametrize("period", [0.0, 0.02, 0.05, 0.2, 1.0])
 @pytest.mark.parametrize("h", [0.02, 0.03])
 @pytest.mark.parametrize("delay", [0.0, 0.013, 0.3])
-def test_samples_are_those_of_a_list_of_events(period, h, delay):
+def test_samples_follow_a_list_of_events(period, h, delay):
     if delay > 16 * period:
         with pytest.raises(BadSampling, match="raise period"):
             sampling.check(Sampling(period, delay))
