@@ -10,6 +10,7 @@
 `networks`     docs/tutorials/your-own-component.md: deviation of networks from onnxruntime
 `gains`        the best gains under a limit of the commands, in docs/explanation/ready-studies.md
 `roundings`    docs/explanation/batch.md: how far the indices of `batch` and `gpu` may be apart
+`consistency`  docs/explanation/navigation.md: NEES of the navigation filter over many runs
 `studies`      the numbers below the figures of that page, from finished studies in folders
 `benchmarks`   runs the commands of the files in benchmarks/results, and writes their output there
 =============  ====================================================================================
@@ -33,7 +34,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import date
 from functools import partial
-from itertools import pairwise, product
+from itertools import pairwise
+from itertools import product as combinations
 from math import ceil, cos, exp, log, radians, sin, sqrt
 from pathlib import Path
 from random import Random
@@ -47,8 +49,15 @@ from auv_fmu.bluerov2 import bluerov2, thruster_allocation
 from auv_fmu.bluerov2.thruster_allocation import Wanted, effect, pseudo_inverse
 from auv_fmu.loop import closed_loop
 from auv_fmu.loop.closed_loop import LongestSteps, Setting, Vehicles
+from auv_fmu.navigation.rotations import inverse, logarithm, product
 from auv_fmu.paper import motion_planner, plant
-from auv_fmu.paper.attitude import normalised, rotation_from_quaternion
+from auv_fmu.paper.attitude import (
+    normalised,
+    quaternion_from_euler,
+    rotate,
+    rotation_from_euler,
+    rotation_from_quaternion,
+)
 from auv_fmu.paper.euler import STEP
 from auv_fmu.paper.output_feedback import ControllerState
 from auv_fmu.remus import remus100
@@ -56,7 +65,7 @@ from auv_fmu.remus.hull import Drag, Hull, cross_flow, inertia
 from auv_fmu.remus.remus100 import Form, RemusState, accelerations, inertia_of
 from auv_fmu.remus.tail import Tail
 from fmus.ports.port import H_MAX
-from orchestrator import simulate
+from orchestrator import Simulations, simulate
 from orchestrator.cosim import PortName, System, Table
 from orchestrator.machine.compilers import ROUNDED
 from orchestrator.machine.errors import InputError
@@ -491,6 +500,70 @@ def fault_measures(made: Table) -> dict[str, float]:
     }
 
 
+# Consistency of the navigation filter
+
+#: Times at which it is tested [s].
+MOMENTS = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 100.0)
+
+#: Sensors of the scenario `navigation`, and changes of them.
+SENSORS = ("imu", "attitude", "depth", "dvl", "fix")
+ERRORS: Mapping[str, Mapping[str, float]] = {
+    "errors that the filter models": {"dvl.bias.std": 0.0},
+    "and a bias of the DVL of 1 mm/s": {},
+    "and a bias of the heading of 2 degrees": {"attitude.bias.heading": radians(2.0)},
+}
+
+
+def estimation_errors(eta: np.ndarray, nu: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Errors of position, velocity and attitude of an estimate (eta, nu), in the earth frame."""
+    (turn, velocity), (turn_hat, velocity_hat) = (
+        (
+            quaternion_from_euler(*row[3:6]),
+            rotate(rotation_from_euler(*row[3:6]), (row[6], row[7], row[8])),
+        )
+        for row in ((*eta, *nu), found)
+    )
+    attitude = logarithm(product(turn, inverse(turn_hat)))
+    return np.array((*eta[:3] - found[:3], *np.subtract(velocity, velocity_hat), *attitude))
+
+
+def nees(n: int, values: Mapping[str, Any], moments: Sequence[float]) -> np.ndarray:
+    """Normalised estimation errors squared of `navigation`, (moments, n, 4).
+
+    They are of position, velocity and attitude, with 3 degrees of freedom, and of all together.
+
+    Args:
+        n: number of runs, each with its own seeds.
+        values: parameters besides the seeds.
+        moments: times [s].
+
+    """
+    random = np.random.default_rng(1)
+    seeds = {f"{name}.seed": random.integers(1, 10**6, n) for name in SENSORS}
+    runs = Simulations("navigation", n, {**seeds, **values})
+    lower, found = np.tril_indices(9), np.empty((len(moments), n, 4))
+    for moment, row in zip(moments, found, strict=True):
+        runs.run(until=moment)
+        estimates = np.hstack([runs["filter.eta"], runs["filter.nu"]])
+        signals = runs["plant.eta"], runs["plant.nu"], estimates
+        for k, (*truth, triangle) in enumerate(zip(*signals, runs["filter.P"], strict=True)):
+            e, P = estimation_errors(*truth), np.empty((9, 9))
+            P[lower] = P.T[lower] = triangle
+            parts = (slice(0, 3), slice(3, 6), slice(6, 9), slice(0, 9))
+            row[k] = [e[part] @ np.linalg.solve(P[part, part], e[part]) for part in parts]
+    return found
+
+
+def consistency(n: int = 1000) -> None:
+    """Print the mean NEES over runs."""
+    spread = 1.96 * np.sqrt(2.0 * np.array((3.0, 3.0, 3.0, 9.0)) / n)
+    print(f"{n} runs; 95 % of the means are within 3 +- {spread[0]:.2f} and 9 +- {spread[3]:.2f}")
+    for title, values in ERRORS.items():
+        print(title)
+        for moment, means in zip(MOMENTS, nees(n, values, MOMENTS).mean(axis=1), strict=True):
+            print(f"  {moment:5g} s", *(f"{mean:9.3f}" for mean in means))
+
+
 # Effect of random seas, links and noise
 
 #: Spans of time for the largest errors [s].
@@ -583,7 +656,7 @@ def guidance(*, n: int = 60) -> None:
 def seeds(*scenarios: str, n: int = 60) -> None:
     """Print the run with the scenario's own seeds and n others, with either controller."""
     every = [scenario for scenario in SPANS if scenario not in GUIDED]
-    for scenario, pd in product(scenarios or every, (False, True)):
+    for scenario, pd in combinations(scenarios or every, (False, True)):
         print(f"\n{scenario}, {'PD' if pd else 'proposed'}: own seeds; median (5 % to 95 %)")
         print_seeds(over_seeds(scenario, pd, n))
         if scenario in EVEN:
@@ -932,7 +1005,7 @@ def networks() -> None:
     """Compare networks with weights as PyTorch draws them, at inputs of standard deviation 1."""
     rows = []
     with TemporaryDirectory() as folder:
-        for sizes, activation in product(SHAPES, FUNCTIONS):
+        for sizes, activation in combinations(SHAPES, FUNCTIONS):
             path = Path(folder) / "network.onnx"
             found = [differences(path, sizes, activation, seed) for seed in range(NETWORKS)]
             largest = [f"{x:.1e}" for x in np.max(found, axis=0)]
@@ -1242,6 +1315,9 @@ def rank(x: Any, y: Any) -> str:
 STATISTICS: Mapping[str, Callable[..., str]] = {
     "n": lambda column: str(len(column)),
     "median": lambda column: f"{column.median():.5g} (n = {len(column)})",
+    "band": lambda column: "{1:.3g} ({0:.3g} to {2:.3g})".format(
+        *column.quantile([0.05, 0.5, 0.95])
+    ),
     "min": lambda column: f"{column.min():.5g}",
     "max": lambda column: f"{column.max():.5g}",
     "share": share,
@@ -1263,7 +1339,7 @@ def lines_of(study: str) -> list[str]:
     for line in queries(study)["lines"].strip().splitlines():
         parts = re.split(r"\{(.*?)\}", line)
         choices = (part.split(",") if i % 2 else [part] for i, part in enumerate(parts))
-        found += map("".join, product(*choices))
+        found += map("".join, combinations(*choices))
     return [re.sub(r"NEAR\((\w+); (\S+)\)", r"\2 / 1.1 < \1 < \2 * 1.1", line) for line in found]
 
 
@@ -1387,6 +1463,7 @@ PAGES: Mapping[str, Callable[..., int | None]] = {
         networks,
         gains,
         roundings,
+        consistency,
         studies,
         benchmarks,
     )

@@ -83,6 +83,7 @@ SMALL_STUDIES = {
     "sampling": "observer",
     "formation": "messages",
     "distance": "commands",
+    "velocity": "worth",
 }
 
 #: Scenarios that come first in the gallery, the best first.

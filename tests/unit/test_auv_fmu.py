@@ -54,6 +54,7 @@ SECTION_4_1 = {
     "LongestSteps": dict.fromkeys(("plant", "controller", "planner"), 0.02),
     "Setting": {"h": 0.02},
 }  # fmt: skip
+NO_SAMPLE = {"age": 0.0, "fresh": False}
 OURS = {
     "RollAxis": {"righting_roll": 5.0, "rolls": True},
     "Localisation": {"std": 0.001, "seed": 1},
@@ -99,6 +100,37 @@ OURS = {
     "formation.Parameters": {
         "number": 2, "vehicles": 3, "omega_chi": 0.3, "turn_chi": 0.2, "estimated": False,
     },
+    "Sampling": {
+        "period": 0.0, "delay": 0.0, "loss": 0.0, "outage_start": 0.0, "outage_duration": 0.0,
+        "seed": 1,
+    },
+    "Bias": {"std": 0.0, "walk": 0.0},
+    "VelocityBias": {"std": 0.0, "walk": 0.0},
+    "AttitudeNoise": {"tilt": radians(0.5), "heading": radians(2.0)},
+    "AttitudeBias": {"tilt": 0.0, "heading": 0.0, "walk": 0.0},
+    "Gyro": {
+        "noise": radians(0.0035), "bias": radians(0.05),
+        "walk": pytest.approx(radians(10.0) / 3600 / 60, rel=1e-13),
+    },
+    "Accelerometer": {
+        "noise": pytest.approx(0.14e-3 * 9.81, rel=1e-13),
+        "bias": pytest.approx(2e-3 * 9.81, rel=1e-13),
+        "walk": pytest.approx(0.04e-3 * 9.81 / 60, rel=1e-13),
+    },
+    "DepthSensor": {"noise": 0.002},
+    "Dvl": {"noise": 0.01},
+    "PositionFix": {"noise": (0.3, 0.3, 0.3)},
+    "Noise": {
+        "depth": 0.002, "tilt": radians(0.5), "heading": radians(2.0), "velocity": 0.01,
+        "position": (0.3, 0.3, 0.3),
+    },
+    "Start": {"position": 10.0, "velocity": 1.0, "attitude": 0.1},
+    "navigation_filter.Parameters": {"delay_max": 1.0, "ell": 0.35},
+    "DepthSample": {"z": 0.0, **NO_SAMPLE},
+    "AttitudeSample": {"eta": ZERO_3, **NO_SAMPLE},
+    "VelocitySample": {"nu": ZERO_3, **NO_SAMPLE},
+    "InertialSample": {"f": ZERO_3, "omega": ZERO_3, **NO_SAMPLE},
+    "PositionSample": {"position": ZERO_3, **NO_SAMPLE},
     "acoustic_link.Parameters": {
         "period": 1.0, "sound_speed": 1500.0, "latency": 0.2, "loss": 0.0, "seed": 1,
         "outage_start": 0.0, "outage_duration": 0.0,

@@ -27,8 +27,8 @@ the age, and "then" for the time of the sample:
     dv_then = dv + [v - v_then - g d]x dtheta + d R da_b
     dtheta_then = dtheta + d R domega_b
 
-That is exact but for the noise of the IMU within the age, and for what its biases do there while
-the vehicle turns.
+That is exact except for the noise of the IMU within the age, and for the effect of its biases there
+while the vehicle turns.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ from auv_fmu.paper.attitude import (
 )
 from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
 
-#: Number of error states, and of those of position, velocity and attitude.
+#: Number of error states, and how many of them are position, velocity and attitude.
 SIZE, SHOWN = 15, 9
 
 #: Most numbers in a measurement.
@@ -119,7 +119,7 @@ class Noise(NamedTuple):
 
 
 class Start(NamedTuple):
-    """Standard deviations at the start, of what no sample tells then."""
+    """Standard deviations at the start, where no sample is fresh."""
 
     position: Annotated[float, Variable("m", "Position, each axis, at the start", POSITIVE)] = 10.0
     velocity: Annotated[float, Variable("m/s", "Velocity, each axis, at the start", POSITIVE)] = 1.0
@@ -127,7 +127,7 @@ class Start(NamedTuple):
 
 
 class Parameters(NamedTuple):
-    """All parameters of the filter; the defaults are those of the sensors."""
+    """All parameters of the filter; the defaults are the sensors'."""
 
     gyro: Gyro = Gyro()
     accelerometer: Accelerometer = Accelerometer()
@@ -140,7 +140,7 @@ class Parameters(NamedTuple):
 
 
 class Samples(NamedTuple):
-    """What the sensors give."""
+    """Samples of all sensors."""
 
     imu: InertialSample = InertialSample()
     attitude: AttitudeSample = AttitudeSample()
@@ -246,7 +246,7 @@ class Biases(NamedTuple):
 
 
 class Estimates(NamedTuple):
-    """What the filter gives to a controller, and what a test of its consistency needs."""
+    """Estimates for a controller, and numbers for a test of consistency."""
 
     y: Annotated[Vector3, Variable(POSITION, "Estimated control point")]
     dy: Annotated[Vector3, Variable(VELOCITY, "Estimated velocity of the control point")]
@@ -367,7 +367,7 @@ def predicted(
 
 
 def transferred(P: Matrix, specific: Vector3, rotation: Rotation, h: float) -> Matrix:
-    """F P, with the transition F of the error; it is the identity but for a few blocks.
+    """F P, with the transition F of the error; it is the identity except for a few blocks.
 
     Args:
         P: any matrix with as many rows as there are errors.

@@ -1,4 +1,4 @@
-"""What all sensors share: samples that are taken now and then, and come late or not at all.
+"""Samples of all sensors: taken now and then, and late or lost.
 
 A sensor takes a sample at the first step at or after each multiple of its `period`, from the start
 of the run on. The sample arrives `delay` later, unless it is lost: by chance, or in an outage. In
@@ -49,15 +49,15 @@ class Sampling(NamedTuple):
         float,
         Variable("s", "How long all samples are lost; 0: never", 0.0, name="outage.duration"),
     ] = 0.0
-    seed: Annotated[int, Variable("1", "Seed of the errors and of what is lost")] = 1
+    seed: Annotated[int, Variable("1", "Seed of the errors and losses")] = 1
 
 
 class Errors(NamedTuple):
     """Standard deviations of the errors of a sample, in the units of its numbers."""
 
-    noise: Annotated[Vector, WIDTH]  #: of the white noise
-    bias: Annotated[Vector, WIDTH]  #: of the bias at the start
-    walk: Annotated[Vector, WIDTH]  #: of the change of the bias, per square root of a second
+    noise: Annotated[Vector, WIDTH]  #: the white noise's
+    bias: Annotated[Vector, WIDTH]  #: the bias's at the start
+    walk: Annotated[Vector, WIDTH]  #: the bias's change in 1 s
 
 
 class SampleState(NamedTuple):
@@ -125,7 +125,7 @@ def drawn(random: float, std: Vector) -> tuple[float, Vector]:
 
 
 def is_due(sampling: Sampling, state: SampleState, t: float) -> bool:
-    """Whether a sample is taken at time t [s]."""
+    """True if a sample is taken at time t [s]."""
     if sampling.period > 0.0:
         return t - state.start >= (state.due - _ROUNDING) * sampling.period
     return t > state.last or state.due == 0.0

@@ -86,7 +86,7 @@ class Textbook:
         )
 
     def measured(self, samples, later):
-        """Innovations, Jacobian and variances of all that has arrived."""
+        """Innovations, Jacobian and deviations of the samples that have arrived."""
         noise = PARAMETERS.noise
         if samples.attitude.fresh and later:
             steps = round(samples.attitude.age / H)

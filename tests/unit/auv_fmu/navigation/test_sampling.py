@@ -36,7 +36,7 @@ def samples(parameters: Sampling, h: float, n: int, errors: Errors = NONE, start
 @pytest.mark.parametrize("period", [0.0, 0.02, 0.05, 0.2, 1.0])
 @pytest.mark.parametrize("h", [0.02, 0.03])
 @pytest.mark.parametrize("delay", [0.0, 0.013, 0.3])
-def test_samples_are_those_of_a_list_of_events(period, h, delay):
+def test_samples_follow_a_list_of_events(period, h, delay):
     if delay > 16 * period:
         with pytest.raises(BadSampling, match="raise period"):
             sampling.check(Sampling(period, delay))
@@ -140,7 +140,7 @@ def test_imu_gives_what_euler_needs_to_restore_the_motion():
     for k in range(1, 60):
         state = imu.derive(parameters, state, motion(h * k), h * k)
         sample = imu.outputs(state, h * k).sample
-        v = v + h * (turn.apply(sample.f) + (0.0, 0.0, 9.81))
+        v = v + h * (turn.apply(sample.f) + np.array((0.0, 0.0, 9.81)))
         turn *= Turn.from_rotvec(h * np.array(sample.omega))
         now = motion(h * k)
         assert v == pytest.approx(velocity(now), abs=1e-12)
