@@ -648,7 +648,7 @@ def print_seeds(found: Mapping[str, np.ndarray]) -> None:
 
 def guidance(*, n: int = 60) -> None:
     """Print the scenarios with guidance, with each law, own seeds and n others."""
-    for scenario, law in product(GUIDED, ("proportional", "integral", "adaptive")):
+    for scenario, law in combinations(GUIDED, ("proportional", "integral", "adaptive")):
         print(f"\n{scenario}, {law}: own seeds; median (5 % to 95 %)")
         print_seeds(over_seeds(scenario, False, n, {"planner.law": law}))
 
@@ -899,7 +899,7 @@ def models() -> None:
 
 def show_turns(name: str, balance: Callable[[Sequence[float], float], np.ndarray]) -> None:
     """Print steady turns, by forces in sway and yaw for a velocity and an angle of the rudder."""
-    for most, speed in product((15.0, 20.0), (1.06, 1.5)):
+    for most, speed in combinations((15.0, 20.0), (1.06, 1.5)):
         v, r = steady_turn(speed, partial(lambda angle, nu: balance(nu, angle), radians(most)))
         print(f"  turn of {name} with {most:g} degrees of rudder at {speed:g} m/s: {r:.3f} rad/s, "
               f"radius {speed / r:.1f} m, sway {v:.3f} m/s")  # fmt: skip
