@@ -18,6 +18,7 @@ subpackage        contents
 :mod:`.paper`     the paper's vehicle, reference, disturbance and controllers
 :mod:`.proof`     quantities that only the paper's proof needs; not part of any FMU
 :mod:`.remus`     the REMUS 100, not in the paper
+:mod:`.bluerov2`  the BlueROV2 Heavy, not in the paper
 :mod:`.water`     waves and currents of a sea, not in the paper
 :mod:`.guidance`  paths, tracks, formations and their messages, not in the paper
 :mod:`.loop`      Fig. 2 as straight-line Python, with all of these

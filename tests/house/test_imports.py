@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 #: Rooms, each of which may import those before it.
 FLOORS = {
     "auv_fmu": (
-        "language", "paper", "proof", "remus", "water", "guidance", "loop", "casadi",
+        "language", "paper", "proof", "remus", "bluerov2", "water", "guidance", "loop", "casadi",
     ),
     "orchestrator": (
         "machine", "cosim", "vehicle", "figures", "runs", "program", "simulation", "bridges",

@@ -50,7 +50,7 @@ NU_0: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _FARTHEST = 1e6
 
 #: Rate at which an error of the quaternion's length decays, where a solver makes one [1/s].
-_NORMALISING = 0.5
+NORMALISING = 0.5
 
 _NO_FORCE = (0.0, 0.0, 0.0)
 _STILL = (0.0, 0.0, 0.0)
@@ -352,7 +352,7 @@ def state_rates(
     x, y, z = cross((p, q, r), rotate_back(rotation, sub(state.water, water)))
     a, b, c, d = state.quaternion
     da, db, dc, dd = quaternion_rates(state.quaternion, (p, q, r))
-    k = _NORMALISING * (1.0 - (a * a + b * b + c * c + d * d))
+    k = NORMALISING * (1.0 - (a * a + b * b + c * c + d * d))
     du, dv, dw, dp, dq, dr = rate.nu_r
     T_u, T_q, T_r = parameters.T
     return PlantState(
