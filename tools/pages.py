@@ -103,6 +103,11 @@ _GROUPS = {
         "pid": "sampled, tunable parameters, `check`",
         "waypoint_guidance": "matrix as parameter, `derive`, internal steps",
     },
+    "laws": {
+        "pd_plus": "sampled, no state, groups of parameters",
+        "pid_law": "sampled, filter memory, `derive`",
+        "super_twisting": "sampled, `copysign`, a name for a type",
+    },
     "estimators": {
         "complementary_filter": "`atan2`, several inputs, exact step",
         "extended_kalman_filter": "sampled, `solve`, refusal, `replaced`",

@@ -15,6 +15,7 @@ module                   contents
 :mod:`.adaptation`       (22), (49), (58): bounding function, its adaptation, Lemma 2
 :mod:`.output_feedback`  (16) to (24), (48) to (51): the proposed controller
 :mod:`.pd`               (57), (58): the PD controller it is compared with
+:mod:`.point_mass`       a mass at the control point, for other laws; not in the paper
 :mod:`.euler`            section 4.1: Euler approximation and its time step
 =======================  ==============================================================
 

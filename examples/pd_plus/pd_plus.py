@@ -1,0 +1,69 @@
+"""A PD+ law: feed-forward of the model along the reference, and PD feedback.
+
+    F = M ddy_d + D dy_d - K_p e - K_d de,  e = y - y_d, limited to what tau_max allows
+
+See Paden and Panja, Globally asymptotically stable 'PD+' controller for robot
+manipulators, International Journal of Control 47 (1988), with the inertia and, as its further term,
+the drag of the vehicle as a mass at its control point (`auv_fmu.paper.point_mass`). Their Coriolis
+term is left out, because the law has no body rates. Where the model is right, the error obeys
+
+    M dde + (K_d + D) de + K_p e = 0
+
+from any state, and V = (de' M de + e' K_p e) / 2 does not rise. The gains place its poles:
+
+    K_p = omega^2 M,  K_d = 2 zeta omega M - D but not below 0
+
+The law measures the velocity dy, and has no integral: a constant force leaves an error of its size
+over K_p. With the default inputs the vehicle does not move, and the command is constant.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu import POSITIVE, Variable, Vector
+from auv_fmu.language.quantities import ACCELERATION, EULER, POSITION, TAU, VELOCITY
+from auv_fmu.language.vectors import Vector3
+from auv_fmu.paper.point_mass import ZERO, PointMass, axes, command, limited, times
+
+SAMPLED = True
+STOP_TIME = 10.0
+
+#: Gains to tune, with their ranges.
+GAINS = {"omega": (0.2, 4.0), "zeta": (0.5, 2.0)}
+
+
+class Parameters(NamedTuple):
+    """Gains and vehicle."""
+
+    omega: Annotated[float, Variable("rad/s", "Frequency of the error", POSITIVE)] = 1.0
+    zeta: Annotated[float, Variable("1", "Damping of the error", 0.0)] = 1.0
+    point: Annotated[PointMass, Variable(name="")] = PointMass()
+
+
+class Inputs(NamedTuple):
+    """Measurement and reference."""
+
+    y: Annotated[Vector, 3, Variable(POSITION, "Measured control point")] = ZERO
+    eta: Annotated[Vector3, Variable(EULER, "Measured Euler angle")] = (0.0, 0.0, 0.0)
+    dy: Annotated[Vector, 3, Variable(VELOCITY, "Measured velocity")] = ZERO
+    y_d: Annotated[Vector, 3, Variable(POSITION, "Desired control point")] = Vector((1.0, 0.0, 0.0))
+    dy_d: Annotated[Vector, 3, Variable(VELOCITY, "Desired velocity")] = ZERO
+    ddy_d: Annotated[Vector, 3, Variable(ACCELERATION, "Desired acceleration")] = ZERO
+
+
+class Outputs(NamedTuple):
+    """The command."""
+
+    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments")]
+
+
+def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:
+    """Return the command."""
+    omega, point = parameters.omega, parameters.point
+    e, de, R_T = inputs.y - inputs.y_d, inputs.dy - inputs.dy_d, axes(inputs.eta)
+    rate = 2.0 * parameters.zeta * omega
+    K_d = Vector(max(rate * m - d, 0.0) for m, d in zip(point.mass, point.drag))
+    forward = times(point.mass, R_T @ inputs.ddy_d) + times(point.drag, R_T @ inputs.dy_d)
+    back = times(point.mass, omega * omega * (R_T @ e)) + times(K_d, R_T @ de)
+    return Outputs(command(point, limited(point, forward - back)))

@@ -1,0 +1,80 @@
+"""The vehicle as a mass at its control point: a model for control laws, not in the paper.
+
+Along the axes of the body the control point has the velocity v = R^T dy, and
+
+    m_k dv_k/dt = f_k - d_k v_k,    m = (m11, m66 / ell^2, m55 / ell^2), and d likewise
+
+with the force f = R^T F of :func:`.control_point.actuator_command`. This is (2) without sway and
+heave, which no actuator drives, and without what couples the others.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from auv_fmu.language.arrays import Matrix, Vector
+from auv_fmu.language.quantities import TAU
+from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.language.vectors import Vector3
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.control_point import ELL, Distance
+
+#: A vector in the earth frame or in the body frame, and the one of no length.
+Triple = Annotated[Vector, 3]
+ZERO = Vector((0.0, 0.0, 0.0))
+
+
+class PointMass(NamedTuple):
+    """Vehicle in the eyes of a law, by default that of Fig. 4."""
+
+    mass: Annotated[
+        Vector,
+        3,
+        Variable(
+            dict.fromkeys("xyz", "kg"), "Mass at the control point along each body axis", POSITIVE
+        ),
+    ] = Vector((25.0, 122.4, 183.7))
+    drag: Annotated[
+        Vector,
+        3,
+        Variable(
+            dict.fromkeys("xyz", "kg/s"), "Damping at the control point along each body axis", 0.0
+        ),
+    ] = Vector((30.0, 163.3, 163.3))
+    ell: Distance = ELL
+    tau_max: Annotated[Vector3, Variable(TAU, "Largest force and moments", POSITIVE)] = (
+        80.0,
+        80.0,
+        80.0,
+    )
+
+
+def axes(euler: Vector3) -> Annotated[Matrix, 3, 3]:
+    """R^T of the attitude (phi, theta, psi) [rad]: its rows are the axes of the body."""
+    return Matrix(rotation_from_euler(*euler))
+
+
+def largest(point: PointMass) -> Triple:
+    """Largest force [N] along each axis of the body, as `tau_max` allows it."""
+    tau_u, tau_q, tau_r = point.tau_max
+    return Vector((tau_u, tau_r / point.ell, tau_q / point.ell))
+
+
+def limited(point: PointMass, force: Triple) -> Triple:
+    """A force [N] in the body frame within its largest values."""
+    return Vector(min(max(f, -most), most) for f, most in zip(force, largest(point)))
+
+
+def command(point: PointMass, force: Triple) -> Vector3:
+    """(tau_u [N], tau_q, tau_r [N.m]) of a force [N] in the body frame, by (11)."""
+    return force[0], -point.ell * force[2], point.ell * force[1]
+
+
+def times(a: Triple, b: Triple) -> Triple:
+    """The products of the elements."""
+    return Vector(x * y for x, y in zip(a, b))
+
+
+def over(a: Triple, b: Triple) -> Triple:
+    """The quotients of the elements."""
+    return Vector(x / y for x, y in zip(a, b))

@@ -1,0 +1,202 @@
+"""The laws of examples/ on a mass at the control point, whose motion is known in closed form."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from auv_fmu import Vector
+from support.examples import EXAMPLES, NAMES, load
+
+#: The laws: every example with gains to tune.
+LAWS = [name for name in NAMES if hasattr(load(name), "GAINS")]
+
+#: Roll, pitch and yaw of the vehicle of these tests [rad], which does not turn.
+EULER = (0.4, -0.5, 2.0)
+
+#: Body to earth, by scipy.
+R = Rotation.from_euler("ZYX", EULER[::-1]).as_matrix()
+
+MASS, DRAG, ELL = (
+    np.array([25.0, 15.0 / 0.1225, 22.5 / 0.1225]),
+    np.array([30.0, 160.0, 150.0]),
+    0.35,
+)
+
+#: A reference over time: its position, velocity and acceleration.
+Reference = Callable[[float], tuple[Any, Any, Any]]
+
+
+class Loop:
+    """A law in a loop with the mass: its velocity in the body frame is v, its position y."""
+
+    def __init__(self, name: str, y: Any, dy: Any, most: float = 1e6, **gains: Any) -> None:
+        """Begin at a position [m] with a velocity [m/s], with limits of the actuators."""
+        self.law: ModuleType = load(name)
+        point = self.law.Parameters().point._replace(
+            mass=Vector(MASS), drag=Vector(DRAG), ell=ELL, tau_max=(most,) * 3
+        )
+        self.parameters = self.law.Parameters(point=point, **gains)
+        self.y, self.v = np.array(y, float), R.T @ np.array(dy, float)
+        self.state: Any = None
+        self.t = 0.0
+
+    def call(self, hook: str, **known: Any) -> Any:
+        """Call a hook of the law with the arguments that it takes."""
+        function = getattr(self.law, hook)
+        known |= {"parameters": self.parameters, "state": self.state}
+        return function(*(known[name] for name in inspect.signature(function).parameters))
+
+    def sample(self, reference: Reference) -> Any:
+        """Force of the law in the body frame [N]; its state is for the next step."""
+        y_d, dy_d, ddy_d = reference(self.t)
+        given = {"y": self.y, "dy": R @ self.v, "y_d": y_d, "dy_d": dy_d, "ddy_d": ddy_d}
+        given = {key: Vector(value) for key, value in given.items()} | {"eta": EULER}
+        fields = self.law.Inputs._fields
+        self.known = {"inputs": self.law.Inputs(*(given[field] for field in fields))}
+        if self.state is None and hasattr(self.law, "start"):
+            self.state = self.call("start", **self.known)
+        if hasattr(self.law, "derive"):
+            self.known["derived"] = self.call("derive", **self.known)
+        self.tau = self.call("outputs", **self.known).tau
+        return np.array([self.tau[0], self.tau[2] / ELL, -self.tau[1] / ELL])
+
+    def step(self, reference: Reference, h: float, w: Any = (0.0, 0.0, 0.0)) -> None:
+        """Move the mass for h seconds with the held force and w [N], both in the body frame."""
+        force = self.sample(reference) + w
+        if hasattr(self.law, "update"):
+            self.state = self.call("update", **self.known, h=h)
+        rate, end = DRAG / MASS, force / DRAG
+        self.y = self.y + R @ (end * h + (self.v - end) * -np.expm1(-rate * h) / rate)
+        self.v = end + (self.v - end) * np.exp(-rate * h)
+        self.t += h
+
+    def error(self, reference: Reference) -> Any:
+        """Tracking error in the body frame [m]."""
+        return R.T @ (self.y - reference(self.t)[0])
+
+
+def still(t: float) -> tuple[Any, Any, Any]:
+    """A reference that stays at the origin."""
+    return np.zeros(3), np.zeros(3), np.zeros(3)
+
+
+def moving(t: float) -> tuple[Any, Any, Any]:
+    """A reference on a curve."""
+    w, a = np.array([0.7, 0.5, 0.3]), np.array([1.0, 2.0, 1.5])
+    return a * np.sin(w * t), a * w * np.cos(w * t), -a * w * w * np.sin(w * t)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_law_is_below_a_hundred_lines_and_keeps_the_contract(name: str) -> None:
+    law = load(name)
+    assert len((EXAMPLES / name / f"{name}.py").read_text().splitlines()) < 100
+    assert {*law.Inputs._fields} <= {"y", "eta", "dy", "y_d", "dy_d", "ddy_d"}
+    assert "tau" in law.Outputs._fields
+    for gain, (low, high) in law.GAINS.items():
+        assert 0.0 < low <= getattr(law.Parameters(), gain) <= high
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_commands_are_within_the_limits(name: str) -> None:
+    loop = Loop(name, [30.0, -20.0, 10.0], [1.0, -1.0, 0.5], most=20.0)
+    reached = 0.0
+    for _ in range(500):
+        loop.step(moving, 0.02)
+        reached = max(reached, *map(abs, loop.tau))
+    assert 19.9 < reached <= 20.0 + 1e-12
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_error_dies_out_with_the_default_gains(name: str) -> None:
+    """From rest, 5 m away from a reference that moves, within limits that act at first."""
+    # PID has no feed-forward.
+    reference = still if name == "pid_law" else moving
+    loop = Loop(name, [3.0, -3.0, 2.5], [0.0, 0.0, 0.0], most=80.0)
+    for _ in range(3000):
+        loop.step(reference, 0.02)
+    assert np.linalg.norm(loop.error(reference)) < 0.03
+
+
+def test_pid_has_the_poles_of_its_gains() -> None:
+    """The matrix of the sampled loop against the polynomial of the continuous one."""
+    h, omega, zeta, T_i, T_f = 1e-4, 1.5, 1.2, 5.0, 0.2
+    gains = {"omega": omega, "zeta": zeta, "T_i": T_i, "T_f": T_f}
+
+    def after(x: Any) -> Any:
+        """Position, velocity and memory one step after x, all along the axes of the body."""
+        y, v, i, y_f = x.reshape(4, 3)
+        loop = Loop("pid_law", R @ y, R @ v, **gains)
+        loop.state = loop.law.State(Vector(R @ i), Vector(R @ y_f), Vector(np.zeros(3)))
+        loop.step(still, h)
+        return np.concatenate(
+            [loop.y @ R, loop.v, np.array(loop.state.i) @ R, np.array(loop.state.y_f) @ R]
+        )
+
+    matrix = np.transpose([after(row) for row in np.eye(12)])
+    found = np.sort_complex(np.log(np.linalg.eigvals(matrix).astype(complex)) / h)
+    expected = []
+    for m, d in zip(MASS, DRAG, strict=True):
+        k_p, k_d, k_i = omega**2 * m, 2 * zeta * omega * m - d, omega**2 * m / T_i
+        # (m s^2 + d s) s (1 + T_f s) + k_p s (1 + T_f s) + k_d s^2 + k_i (1 + T_f s)
+        expected += [*np.roots([m * T_f, m + d * T_f, d + k_p * T_f + k_d, k_p + k_i * T_f, k_i])]
+    # Half a step of delay by the held force, relative to the fastest pole.
+    assert found == pytest.approx(np.sort_complex(expected), rel=2e-3)
+
+
+def test_pid_does_not_wind_up() -> None:
+    """Held 10 m away, then put on the other side: the force turns within the time of the loop."""
+    loop = Loop("pid_law", R @ [10.0, 0.0, 0.0], [0.0] * 3, most=80.0, omega=1.0)
+    for _ in range(5000):
+        loop.step(still, 0.02)
+        loop.y, loop.v = R @ [10.0, 0.0, 0.0], np.zeros(3)
+    assert loop.tau[0] == -80.0
+    loop.y = R @ [-0.5, 0.0, 0.0]
+    forces = []
+    for _ in range(150):
+        loop.step(still, 0.02)
+        loop.y, loop.v = R @ [-0.5, 0.0, 0.0], np.zeros(3)
+        forces.append(loop.tau[0])
+    assert forces[-1] > 0.0
+
+
+def test_pd_plus_has_the_error_of_its_poles() -> None:
+    omega, zeta, h = 1.2, 1.0, 1e-3
+    e, de = np.array([0.5, -1.0, 0.8]), np.array([0.2, 0.3, -0.4])
+    y_d, dy_d, _ = moving(0.0)
+    loop = Loop("pd_plus", y_d + R @ e, dy_d + R @ de, omega=omega, zeta=zeta)
+    seen = []
+    for _ in range(5000):
+        loop.step(moving, h)
+        seen.append(loop.error(moving))
+    t = h * np.arange(1, 5001)[:, None]
+    # Two poles at -omega: e(t) = (e + (de + omega e) t) exp(-omega t).
+    assert np.array(seen) == pytest.approx(
+        (e + (de + omega * e) * t) * np.exp(-omega * t), abs=2e-3
+    )
+
+
+@pytest.mark.parametrize("h", [2e-3, 1e-3])
+def test_super_twisting_reaches_its_surface_in_finite_time_and_stays(h: float) -> None:
+    """Under a disturbance with |dw/dt| < L; of the order of h^2, as Levant (1993) proves."""
+    L, c = 0.5, 1.0
+
+    def w(t: float) -> Any:
+        """Disturbance in the earth frame [m/s2]."""
+        return np.array([0.4 * np.sin(t), 0.3 - 0.2 * np.sin(2.0 * t), 0.45 * np.cos(t)])
+
+    loop = Loop("super_twisting", [0.5, 0.0, -0.3], [0.0, 0.5, 0.4], L=L, c=c)
+    late = []
+    while loop.t < 10.0:
+        loop.step(still, h, MASS * (R.T @ w(loop.t)))
+        if loop.t > 5.0:
+            s = R @ loop.v + c * loop.y
+            late.append(np.abs([*(s / (L * h * h)), *((loop.state.v + Vector(w(loop.t))) / L / h)]))
+    # In units of L h^2 and of L h: numbers of the order of one, for each h.
+    assert np.max(late) < 10.0
