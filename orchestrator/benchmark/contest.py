@@ -86,12 +86,14 @@ class Vehicle(NamedTuple):
         name: stem of its files.
         scenario: its loop.
         study: what is drawn at random.
+        known: what laws know of it: values of groups of parameters.
 
     """
 
     name: str
     scenario: Scenario
     study: Study
+    known: Mapping[str, Sequence[float]]
 
     @property
     def tasks(self) -> Sequence[str]:
@@ -203,12 +205,16 @@ def _groups(law: Component) -> set[str]:
 
 def vehicles() -> dict[str, Vehicle]:
     """Return the vehicles, by name."""
-    return {name: _vehicle(name) for name in ("auv", "bluerov", "remus")}
-
-
-def _vehicle(name: str) -> Vehicle:
-    scenario = read_scenario(str(_HERE / "vehicles" / f"{name}.toml"))
-    return Vehicle(name, scenario, read_study(str(_HERE / "draws" / f"{name}.toml")))
+    known = tomllib.loads((_HERE / "known.toml").read_text(encoding="utf-8"))
+    return {
+        name: Vehicle(
+            name,
+            read_scenario(str(_HERE / "vehicles" / f"{name}.toml")),
+            read_study(str(_HERE / "draws" / f"{name}.toml")),
+            values,
+        )
+        for name, values in known.items()
+    }
 
 
 def loop_of(law: Law, vehicle: Vehicle, gains: Mapping[str, float]) -> tuple[Scenario, System]:
@@ -240,15 +246,16 @@ def loop_of(law: Law, vehicle: Vehicle, gains: Mapping[str, float]) -> tuple[Sce
         wires=wires,
     )
     system = closed_loop(folder, with_fmus(scenario, folder, PYTHON))
-    known = {
+    known: dict[str, Any] = {
         f"{LAW}.{name}": system.value(PortName.read(place))
         for name, place in _KNOWN.items()
         if name in component.variables
     }
-    values = {**known, **members(law, gains)}
-    return replace(scenario, parameters=system.expanded(scenario.parameters)), (
-        system.with_parameters(values)
-    )
+    for name, values in vehicle.known.items():
+        ports = system.members(f"{LAW}.{name}", ("parameter",))
+        known |= zip(map(str, ports), values, strict=False)
+    system = system.with_parameters({**known, **members(law, gains)})
+    return replace(scenario, parameters=system.expanded(scenario.parameters)), system
 
 
 def members(law: Law, gains: Mapping[str, float]) -> dict[str, float]:
@@ -262,9 +269,7 @@ def members(law: Law, gains: Mapping[str, float]) -> dict[str, float]:
     values = {}
     for name, value in gains.items():
         found = [
-            port
-            for port in parameters
-            if port == name or port.startswith((f"{name}.", f"{name}["))
+            port for port in parameters if port == name or port.startswith((f"{name}.", f"{name}["))
         ]
         if not found:
             hint = did_you_mean(name, parameters)

@@ -57,19 +57,19 @@ class Parameters(NamedTuple):
     task: Annotated[Task, Variable("1", "The task")] = Task.HELIX
     speed: Annotated[float, Variable("m/s", "Speed of helix and path", POSITIVE)] = 0.5
     depth: Annotated[float, Variable("m", "Depth of the start")] = 3.0
-    radius: Annotated[float, Variable("m", "Radius of the helix", POSITIVE, name="helix.radius")] = (
-        3.0
-    )
-    sinking: Annotated[float, Variable("m/s", "Sinking speed of the helix", name="helix.sinking")] = (
-        0.05
-    )
+    radius: Annotated[
+        float, Variable("m", "Radius of the helix", POSITIVE, name="helix.radius")
+    ] = 3.0
+    sinking: Annotated[
+        float, Variable("m/s", "Sinking speed of the helix", name="helix.sinking")
+    ] = 0.05
     step_speed: Annotated[float, Variable("m/s", "Speed of the step", 0.0, name="step.speed")] = 0.0
     offset: Annotated[
         Vector, 3, Variable("m", "Offset of the step", members=XYZ, name="step.offset")
     ] = Vector((2.0, 1.0, 1.0))
-    leg: Annotated[float, Variable("m", "Length of a leg of the path", POSITIVE, name="path.leg")] = (
-        6.0
-    )
+    leg: Annotated[
+        float, Variable("m", "Length of a leg of the path", POSITIVE, name="path.leg")
+    ] = 6.0
     turn: Annotated[float, Variable("rad", "Turn at a corner of the path", name="path.turn")] = 1.2
     dive: Annotated[
         float, Variable("m", "Change of depth on each second leg", name="path.dive")
@@ -78,9 +78,9 @@ class Parameters(NamedTuple):
         float, Variable("s", "Duration of the rounding of a corner", POSITIVE, name="path.rounding")
     ] = 6.0
     current: Annotated[Vector, 3, Variable("m/s", "Current", members=XYZ)] = Vector((0.1, 0.0, 0.0))
-    calm: Annotated[
-        float, Variable("1", "Share of the current in tasks without one", 0.0, 1.0)
-    ] = 0.2
+    calm: Annotated[float, Variable("1", "Share of the current in tasks without one", 0.0, 1.0)] = (
+        0.2
+    )
     waves: Waves = Waves()
     begin: Annotated[float, Variable("s", "Begin of the loss", 0.0, name="loss.begin")] = 22.0
     duration: Annotated[float, Variable("s", "Duration of the loss", 0.0, name="loss.duration")] = (
@@ -184,6 +184,4 @@ def outputs(parameters: Parameters, derived: Derived, inputs: Inputs, t: float) 
         d, e, f = waves.along(moved.gradient, (water[0], water[1], water[2]))
         dwater = Vector((a + d, b + e, c + f))
     lost = task == Task.SENSOR_LOSS and 0.0 <= t - parameters.begin < parameters.duration
-    return Outputs(
-        wanted(parameters, derived.waypoints, t), water, dwater, 1.0 if lost else 0.0
-    )
+    return Outputs(wanted(parameters, derived.waypoints, t), water, dwater, 1.0 if lost else 0.0)
