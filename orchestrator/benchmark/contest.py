@@ -149,7 +149,7 @@ def _gains_of(script: Path) -> dict[str, Range]:
             continue
         try:
             table = ast.literal_eval(getattr(node, "value"))  # noqa: B009
-            gains = {str(key): Range(*map(float, ends)) for key, ends in table.items()}
+            gains = {str(key): Range(float(low), float(high)) for key, (low, high) in table.items()}
         except (AttributeError, TypeError, ValueError):
             raise InputError(why) from None
         if not all(0.0 < low < high and isfinite(high) for low, high, _ in gains.values()):
@@ -266,7 +266,7 @@ def members(law: Law, gains: Mapping[str, float]) -> dict[str, float]:
 
     """
     parameters = [variable.name for variable in component_of(law.component).having("parameter")]
-    values = {}
+    values = dict[str, float]()
     for name, value in gains.items():
         found = [
             port for port in parameters if port == name or port.startswith((f"{name}.", f"{name}["))

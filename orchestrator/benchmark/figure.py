@@ -45,6 +45,7 @@ def draw(
                     linewidth=1.0,
                     label=laws[law].label,
                 )
+            panel.grid(visible=False, axis="x")
             panel.set_yscale("log")
             panel.set_ylabel("late error [m]")
             panel.set_title(vehicle.scenario.label)

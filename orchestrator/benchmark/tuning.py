@@ -111,7 +111,8 @@ def _own(law: Law, ready: Ready) -> np.ndarray:
     firsts = (next(iter(members(law, {name: 0.0}))) for name in law.gains)
     values: Any = [prepared.system.value(PortName.read(name)) for name in firsts]
     # A gain may be zero by default.
-    return np.log(np.maximum(np.array(values, dtype=float), 1e-9))
+    own: np.ndarray = np.log(np.maximum(np.array(values, dtype=float), 1e-9))
+    return own
 
 
 def _costs(law: Law, ready: Ready, gains: np.ndarray, means: Means) -> np.ndarray:

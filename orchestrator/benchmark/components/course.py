@@ -155,7 +155,7 @@ def wanted(parameters: Parameters, waypoints: Waypoints, t: float) -> Reference:
         x, y, z = parameters.offset
         along = parameters.step_speed
         return Reference((x + along * t, y, depth + z), (along, 0.0, 0.0), (0.0, 0.0, 0.0))
-    if task == Task.PATH or task == Task.SEA:
+    if task == Task.PATH or task == Task.SEA:  # noqa: PLR1714
         since = t + waypoints.rounding
         corner = corner_ahead(waypoints, first_corner(waypoints, 0.0), since)
         return reference(waypoints, corner, since)
@@ -172,7 +172,7 @@ def wanted(parameters: Parameters, waypoints: Waypoints, t: float) -> Reference:
 def outputs(parameters: Parameters, derived: Derived, inputs: Inputs, t: float) -> Outputs:
     """The reference, the water at the vehicle, and the loss."""
     task = parameters.task
-    flows = task == Task.CURRENT or task == Task.SEA
+    flows = task == Task.CURRENT or task == Task.SEA  # noqa: PLR1714
     water = parameters.current if flows else parameters.calm * parameters.current
     dwater = Vector((0.0, 0.0, 0.0))
     if task == Task.SEA:

@@ -33,9 +33,5 @@ class Outputs(NamedTuple):
 
 def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:
     """Limit each to its range."""
-    return Outputs(
-        Vector(
-            max(-most, min(most, wanted))
-            for wanted, most in zip(inputs.command, parameters.tau_max)
-        )
-    )
+    most, wanted = parameters.tau_max, inputs.command
+    return Outputs(Vector(max(-most[i], min(most[i], wanted[i])) for i in range(3)))
