@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import ast
 import tomllib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from math import isfinite
@@ -25,6 +26,7 @@ from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.made_components import with_fmus
 from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.runs.wiring import closed_loop
+from orchestrator.studies.batch_engine import ADVICE
 from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study import Range, Study, read_study
 from orchestrator.studies.sweep import Means, complete_study
@@ -183,9 +185,9 @@ def _check(name: str, law: Component) -> None:
     for variable in law.having("input"):
         if variable.name not in _INPUTS:
             groups = ", ".join((*SENSORS, *REFERENCES))
-            hint = did_you_mean(variable.name, sorted(_INPUTS))
             raise InputError(
-                f"{name}: the input {variable.name} is unknown{hint}; a law may have {groups}"
+                f"{name}: the input {variable.name} is unknown: a law may have {groups}"
+                f"{did_you_mean(variable.name, sorted(_INPUTS))}"
             )
     definitions_of(System(name, {LAW: law}, ()))
 
@@ -290,6 +292,7 @@ def study_of_law(law: Law, vehicle: Vehicle, n: int) -> Study:
         scenario=(name,),
         indices=(_HERE / "score.py",),
         draws=False,
+        explains=False,
     )
 
 
@@ -321,15 +324,30 @@ def runs_of(
 
     """
     study = study_of_law(law, vehicle, n)
-    return complete_study(
-        study,
-        replace(means, kind=PYTHON),
-        out / vehicle.name / law.name,
-        command,
-        say,
-        progress,
-        systems={study.name: loop_of(law, vehicle, gains)},
-    )
+    with clear_refusals(law):
+        return complete_study(
+            study,
+            replace(means, kind=PYTHON),
+            out / vehicle.name / law.name,
+            command,
+            say,
+            progress,
+            systems={study.name: loop_of(law, vehicle, gains)},
+        )
+
+
+@contextmanager
+def clear_refusals(law: Law) -> Iterator[None]:
+    """Name the law in a refusal of the engine, without the advice to take another engine."""
+    try:
+        yield
+    except InputError as error:
+        text = str(error)
+        if text.endswith(ADVICE):
+            text = text.removesuffix(f"; {ADVICE}").partition(": ")[2]
+            is_named = Path(law.component).name in text
+            text = text if is_named else f"{law.component}: {text}"
+        raise InputError(text) from None
 
 
 def read_gains(path: Path) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
-from math import sqrt
+from math import isnan, nan, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,7 +92,11 @@ def _line(made: Made, law: str, vehicles: Sequence[str], task: str) -> Line:
     parts = [made[law, vehicle].of(task) for vehicle in vehicles]
     every = {name: np.concatenate([part[name].ravel() for part in parts]) for name in parts[0]}
     errors = np.nan_to_num(every["error"], nan=np.inf)
-    n = len(errors)
+    n, is_made = len(errors), ~np.isnan(every["error"])
+    effort, saturated, chatter = (
+        float(mean(every[name][is_made])) if is_made.any() else nan
+        for name, mean in (("effort", np.median), ("saturated", np.mean), ("chatter", np.median))
+    )
     return Line(
         law,
         vehicles[0] if len(vehicles) == 1 else ALL,
@@ -100,9 +104,9 @@ def _line(made: Made, law: str, vehicles: Sequence[str], task: str) -> Line:
         n,
         cost_of([part["cost"].mean(axis=0) for part in parts]),
         quantiles(errors),
-        float(np.nanmedian(every["effort"])),
-        float(np.nanmean(every["saturated"])),
-        float(np.nanmedian(every["chatter"])),
+        effort,
+        saturated,
+        chatter,
         share_of(int(every["failed"].sum()), n),
     )
 
@@ -161,9 +165,10 @@ def cells(made: Made, laws: Mapping[str, Law], vehicles: Mapping[str, Vehicle], 
                 ", ".join(sensors_of(law)),
                 _band(line.cost),
                 *map(_band, errors),
-                f"{100 * line.effort:.0f}",
-                f"{100 * line.saturated:.1f}",
-                f"{100 * line.chatter:.0f}",
+                *(
+                    "-" if isnan(x) else f"{100 * x:.2g}" if abs(x) < 1.0 else f"{100 * x:.0f}"
+                    for x in (line.effort, line.saturated, line.chatter)
+                ),
                 _band([100 * share for share in line.failed]),
             ]
         )

@@ -19,7 +19,14 @@ import numpy as np
 from fmus.discovery import digest_at
 from fmus.kinds import PYTHON
 from orchestrator.benchmark import cost
-from orchestrator.benchmark.contest import Law, Vehicle, loop_of, members, study_of_law
+from orchestrator.benchmark.contest import (
+    Law,
+    Vehicle,
+    clear_refusals,
+    loop_of,
+    members,
+    study_of_law,
+)
 from orchestrator.benchmark.cost import COLUMNS, costs
 from orchestrator.cosim import PortName
 from orchestrator.studies.columns import Outcomes, Points
@@ -102,7 +109,8 @@ def training(study: Study) -> Study:
 def _prepared(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> Ready:
     study = training(study_of_law(law, vehicle, budget.draws))
     systems = {study.name: loop_of(law, vehicle, {})}
-    return prepare_study(study, replace(means, kind=PYTHON, points=None), given=systems)
+    with clear_refusals(law):
+        return prepare_study(study, replace(means, kind=PYTHON), given=systems)
 
 
 def _own(law: Law, ready: Ready) -> np.ndarray:

@@ -147,6 +147,7 @@ class Study:
         folder: of the file; None without a file.
         indices: files of indices that no figure need show.
         draws: False if it draws no figures.
+        explains: False if runs that a program refuses are not repeated by FMUs for the reason.
 
     """
 
@@ -166,6 +167,7 @@ class Study:
     folder: Path | None = None
     indices: Sequence[Path] = ()
     draws: bool = True
+    explains: bool = True
 
     @property
     def stem(self) -> str:

@@ -225,7 +225,7 @@ def complete_study(
                 for hint in filter(None, (remark, faster(space, engine, ready.means, ready.own))):
                     say(hint)
             engines = [engine]
-            if isinstance(engine, BatchEngine):
+            if isinstance(engine, BatchEngine) and study.explains:
                 # For runs that it refuses, since it gives no reason.
                 engines.append(FmuEngine(space.prepared, means.loop, ready.own, engine.functions))
             _complete(store, engines, space, ready.means, study.name if progress else None)
@@ -523,7 +523,7 @@ def _complete(
             outcomes = making_runs(engine, points, scheduler=means.scheduler, workers=means.workers)
             with outcomes as blocks:
                 for block in blocks:
-                    is_refused = block.failures.has(REFUSED)
+                    is_refused = block.failures.has(REFUSED) & (engine is not engines[-1])
                     refused.add(Numbers.of(block.numbers[is_refused]))
                     store.add(block[~is_refused])
                     bar.update(len(block) - int(is_refused.sum()))

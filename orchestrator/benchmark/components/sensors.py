@@ -7,6 +7,7 @@ with it.
 
 from __future__ import annotations
 
+from math import radians
 from typing import Annotated, NamedTuple
 
 from auv_fmu import Variable, Vector
@@ -25,12 +26,12 @@ class Parameters(NamedTuple):
     )
     velocity: Annotated[
         float, Variable("m/s", "Noise of the velocity", 0.0, name="velocity.std")
-    ] = 0.006
+    ] = 0.01
     attitude: Annotated[
         float, Variable("rad", "Noise of roll and pitch", 0.0, name="attitude.std")
-    ] = 0.0017
+    ] = radians(0.1)
     heading: Annotated[float, Variable("rad", "Noise of the heading", 0.0, name="heading.std")] = (
-        0.0052
+        radians(0.3)
     )
     velocity_lost: Annotated[
         int, Variable("1", "1: the velocity is lost with the position; 0: it is not", 0, 1)
