@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from fmus.discovery import digest_at
 from fmus.kinds import PYTHON
 from orchestrator.cosim import Component, PortName, System, read_component
-from orchestrator.machine.errors import InputError, did_you_mean
+from orchestrator.machine.errors import InputError, did_you_mean, reason
 from orchestrator.program.components import definitions_of
 from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.made_components import with_fmus
@@ -142,9 +142,9 @@ def _gains_of(script: Path) -> dict[str, Range]:
     """Read `GAINS` in a script without running it; empty if there is none."""
     why = f'{script}: {GAINS}: write {{"name": (low, high)}} with 0 < low < high'
     try:
-        statements = ast.parse(script.read_text(encoding="utf-8")).body
+        statements = ast.parse(script.read_bytes(), script.name).body
     except (SyntaxError, ValueError) as error:
-        raise InputError(f"{script}: {error}") from None
+        raise InputError(f"{script}: {reason(error)}") from None
     for node in statements:
         targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
         if not any(isinstance(each, ast.Name) and each.id == GAINS for each in targets):
@@ -160,14 +160,19 @@ def _gains_of(script: Path) -> dict[str, Range]:
     return {}
 
 
-@cache
-def component_of(component: str) -> Component:
+def component_of(law: Law) -> Component:
     """Return the component of a law.
 
     Raises:
         InputError: it is not one that can be a law.
 
     """
+    return _component(law.component, law.digest, Path.cwd())
+
+
+@cache
+def _component(component: str, digest: str, where: Path) -> Component:
+    """Return a component, read once while its script does not change."""
     folder = current_fmus(PYTHON)
     scenario = Scenario(Path(component).stem, components={LAW: component})
     made = str(with_fmus(scenario, folder, PYTHON).components[LAW])
@@ -194,7 +199,7 @@ def _check(name: str, law: Component) -> None:
 
 def sensors_of(law: Law) -> list[str]:
     """Return what the sensors measure that a law uses."""
-    groups = _groups(component_of(law.component))
+    groups = _groups(component_of(law))
     return [what for group, what in SENSORS.items() if group in groups]
 
 
@@ -231,7 +236,7 @@ def loop_of(law: Law, vehicle: Vehicle, gains: Mapping[str, float]) -> tuple[Sce
         InputError: the law cannot be in this loop, or lacks a gain.
 
     """
-    component, folder = component_of(law.component), current_fmus(PYTHON)
+    component, folder = component_of(law), current_fmus(PYTHON)
     groups, wires = _groups(component), dict(vehicle.scenario.wires)
     for group in (*SENSORS, *REFERENCES):
         wire = f"{LAW}.{group}"
@@ -267,7 +272,7 @@ def members(law: Law, gains: Mapping[str, float]) -> dict[str, float]:
         InputError: the law has no such parameter.
 
     """
-    parameters = [variable.name for variable in component_of(law.component).having("parameter")]
+    parameters = [variable.name for variable in component_of(law).having("parameter")]
     values = dict[str, float]()
     for name, value in gains.items():
         found = [

@@ -94,7 +94,7 @@ def _benchmark(options: argparse.Namespace) -> int:
     if choice.task is not None:
         _chosen("task", choice.task, dict.fromkeys(tasks))
     for law in entered.values():
-        component_of(law.component)
+        component_of(law)
     tuned = (own or entered) if choice.tune else {}
     try:
         gains = _gains(entered, tuned, on, options)

@@ -95,15 +95,12 @@ def test_runs_equal_those_of_fmus(vehicle: str):
     made = ready("pd", vehicle, 1)
     assert isinstance(made.engine, BatchEngine)
     by_fmus = FmuEngine(made.space.prepared, "python", made.own)
-    points = [*made.space.points(np.arange(6))]
     # While the position is lost, too.
     points = [
-        point._replace(parameters={**point.parameters, "planner.loss.begin": 1.0})
-        for point in points
+        point._replace(stop_time=0.6, parameters={**point.parameters, "planner.loss.begin": 0.3})
+        for point in made.space.points(np.arange(6))
     ]
-    assert {str(point.parameters["planner.task"]) for point in points} == {
-        *("helix", "step", "path", "current", "sea", "sensor_loss")
-    }
+    assert len({point.parameters["planner.task"] for point in points}) == 6
     for one, other in zip(
         outcomes_of(made.engine, points), outcomes_of(by_fmus, points), strict=True
     ):
@@ -115,12 +112,18 @@ def test_numbers_of_a_run_follow_from_its_rows():
     made = ready("paper", "auv", 1)
     assert isinstance(made.engine, BatchEngine)
     [point] = made.space.points(np.array([3]))
+    # Some commands are beyond these limits.
+    point = point._replace(parameters={**point.parameters, "limiter.tau_max.u": 20.0})
     [outcome] = outcomes_of(made.engine, [point])
     table = made.engine.table(point)
     reference = table.group("planner.y_d.x", "planner.y_d.y", "planner.y_d.z")
     error = np.linalg.norm(true_control_point(table) - reference, axis=1)
     late = error[table.time >= 1.0]
-    tau = table.group("controller.tau.u", "controller.tau.q", "controller.tau.r")[:-1] / 80.0
+    tau = table.group("controller.tau.u", "controller.tau.q", "controller.tau.r")[:-1] / [
+        20.0,
+        80.0,
+        80.0,
+    ]
     limited = np.clip(tau, -1.0, 1.0)
     expected = {
         "error": np.sqrt((late**2).mean()),
@@ -224,7 +227,7 @@ def test_statistics_are_those_of_numpy_and_scipy():
     for count, n in ((0, 30), (7, 100), (100, 100)):
         share, low, high = share_of(count, n)
         known = scipy.stats.binomtest(count, n).proportion_ci(method="wilson")
-        assert (share, low, high) == pytest.approx((count / n, known.low, known.high), abs=1e-9)
+        assert (share, low, high) == pytest.approx((count / n, known.low, known.high), abs=1e-7)
     draws = [random.exponential(size=200) + 0.1 for _ in range(2)]
     middle, low, high = cost_of(draws)
     assert middle == pytest.approx(scipy.stats.gmean([values.mean() for values in draws]))
@@ -262,7 +265,7 @@ def test_costs_and_ranks():
     assert good.cost[0] == pytest.approx(0.25 + more)
     assert refused.cost[0] == pytest.approx((0.9 + 3.0 * more + FAILED) / 4.0)
     assert refused.failed[0] == 0.25 and refused.error[2] == np.inf and refused.effort == 0.5
-    assert lost.cost[0] == FAILED and lost.failed[0] == 1.0
+    assert lost.cost[0] == pytest.approx(FAILED) and lost.failed[0] == 1.0
     [line] = lines(made, ["good"], ["one"], "b")
     assert (line.runs, line.cost[0]) == (2, pytest.approx(0.35 + more))
 
@@ -307,7 +310,7 @@ COMMAND = ["benchmark", "my_law.py", "--runs", "2", "--vehicle", "auv", "--law",
 def test_a_law_of_the_users_own_enters_the_table(mine: Path, capsys, monkeypatch):
     assert main(COMMAND) == 0
     out = capsys.readouterr().out
-    assert mentions(out, ["my_law", "the paper's PD", "position, attitude, velocity"])
+    assert mentions(out, "my_law PD position, attitude, velocity")
     folder = mine.parent / "results" / "benchmark"
     rows = [*csv.DictReader((folder / "table.csv").open())]
     assert {(row["law"], row["vehicle"]) for row in rows} == {("my_law", "auv"), ("pd", "auv")}
@@ -320,6 +323,7 @@ def test_a_law_of_the_users_own_enters_the_table(mine: Path, capsys, monkeypatch
     assert "my_law" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_its_gains_are_searched_once(mine: Path, capsys, monkeypatch):
     monkeypatch.setattr("orchestrator.commands.benchmark.Budget", lambda: Budget(1, 2, 1, 1))
     assert main([*COMMAND, "--tune"]) == 0
@@ -335,12 +339,12 @@ def test_its_gains_are_searched_once(mine: Path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("tau: Annotated", "force: Annotated", ["no output tau.u", "tau.u, tau.q, tau.r"]),
-        ("y_d", "wind", ["input wind.x is unknown", "y, eta, dy, y_d"]),
-        ("(1.0, 100.0)", "(1.0, 0.5)", ["GAINS", "0 < low < high"]),
-        ("(1.0, 100.0)", "range(2)", ["GAINS", "0 < low < high"]),
-        ("    return Outputs", "    x = [1.0]\n    return Outputs", ["my_law.py", "a list is not"]),
-        ("def outputs(", "def outputs((", ["my_law.py", "was never closed"]),
+        ("tau: Annotated", "force: Annotated", "no output tau.u a law has tau.u, tau.q, tau.r"),
+        ("y_d", "wind", "input wind.x is unknown y, eta, dy, y_d"),
+        ("(1.0, 100.0)", "(1.0, 0.5)", "GAINS 0 < low < high"),
+        ("(1.0, 100.0)", "range(2)", "GAINS 0 < low < high"),
+        ("    return Outputs", "    x = [1.0]\n    return Outputs", "my_law.py a list is not"),
+        ("def outputs(", "def outputs((", "my_law.py line 32"),
     ],
 )
 def test_what_cannot_be_a_law_is_refused_in_a_line(mine: Path, capsys, old, new, words):
@@ -353,12 +357,12 @@ def test_what_cannot_be_a_law_is_refused_in_a_line(mine: Path, capsys, old, new,
 @pytest.mark.parametrize(
     ("options", "words"),
     [
-        (["--law", "foo"], ["no law 'foo'", "there are paper"]),
-        (["--vehicle", "remu"], ["no vehicle 'remu'", "did you mean remus"]),
-        (["--task", "sing"], ["no task 'sing'"]),
-        (["--runs", "0"], ["must be at least 1"]),
-        (["none.py"], ["none.py: no such Python file"]),
-        (["paper.py"], ["paper", "has this name"]),
+        (["--law", "foo"], "no law foo there are paper"),
+        (["--vehicle", "remu"], "no vehicle remu did you mean remus"),
+        (["--task", "sing"], "no task sing"),
+        (["--runs", "0"], "must be at least 1"),
+        (["none.py"], "none.py no such Python file"),
+        (["paper.py"], "paper has this name"),
     ],
 )
 def test_bad_options_are_refused(mine: Path, capsys, options, words):
