@@ -104,6 +104,8 @@ _GROUPS = {
         "waypoint_guidance": "matrix as parameter, `derive`, internal steps",
     },
     "laws": {
+        "backstepping": "sampled, a shared function, `derive`",
+        "mrac": "sampled, matrix as state, a state as rate",
         "pd_plus": "sampled, no state, groups of parameters",
         "pid_law": "sampled, filter memory, `derive`",
         "super_twisting": "sampled, `copysign`, a name for a type",

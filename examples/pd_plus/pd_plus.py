@@ -2,10 +2,10 @@
 
     F = M ddy_d + D dy_d - K_p e - K_d de,  e = y - y_d, limited to what tau_max allows
 
-See Paden and Panja, Globally asymptotically stable 'PD+' controller for robot
-manipulators, International Journal of Control 47 (1988), with the inertia and, as its further term,
-the drag of the vehicle as a mass at its control point (`auv_fmu.paper.point_mass`). Their Coriolis
-term is left out, because the law has no body rates. Where the model is right, the error obeys
+Paden and Panja (Globally asymptotically stable 'PD+' controller for robot manipulators,
+International Journal of Control 47, 1988) feed the inertia and the Coriolis terms of a robot
+forward. Here M and D are mass and drag at the control point (`auv_fmu.paper.point_mass`); there are
+no Coriolis terms, for want of body rates. If the model is right, the error obeys
 
     M dde + (K_d + D) de + K_p e = 0
 
@@ -30,7 +30,7 @@ SAMPLED = True
 STOP_TIME = 10.0
 
 #: Gains to tune, with their ranges.
-GAINS = {"omega": (0.2, 4.0), "zeta": (0.5, 2.0)}
+GAINS = {"omega": (0.2, 8.0), "zeta": (0.5, 2.0)}
 
 
 class Parameters(NamedTuple):

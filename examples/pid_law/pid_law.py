@@ -22,13 +22,13 @@ from typing import Annotated, NamedTuple
 from auv_fmu import POSITIVE, Variable, Vector
 from auv_fmu.language.quantities import EULER, POSITION, TAU, VELOCITY
 from auv_fmu.language.vectors import Vector3
-from auv_fmu.paper.point_mass import ZERO, PointMass, Triple, axes, command, limited, times
+from auv_fmu.paper.point_mass import ZERO, PointMass, Triple, axes, command, limited, times, unwound
 
 SAMPLED = True
 STOP_TIME = 10.0
 
 #: Gains to tune, with their ranges.
-GAINS = {"omega": (0.2, 4.0), "zeta": (0.5, 2.0), "T_i": (2.0, 100.0), "T_f": (0.02, 0.5)}
+GAINS = {"omega": (0.2, 8.0), "zeta": (0.5, 2.0), "T_i": (2.0, 100.0), "T_f": (0.02, 0.5)}
 
 
 class Parameters(NamedTuple):
@@ -84,14 +84,11 @@ def update(
     parameters: Parameters, state: State, derived: tuple[Triple, Triple], inputs: Inputs, h: float
 ) -> State:
     """Return the state h seconds later."""
-    R_T, rate = axes(inputs.eta), -parameters.omega * parameters.omega / parameters.T_i
-    grows = rate * (R_T @ (inputs.y - inputs.y_d))
-    grows = Vector(0.0 if g * missing > 0.0 else g for g, missing in zip(grows, derived[1]))
+    rate = -parameters.omega * parameters.omega / parameters.T_i * (inputs.y - inputs.y_d)
+    i = state.i + h * unwound(axes(inputs.eta), rate, derived[1])
     share = -expm1(-h / parameters.T_f)
     y_f = state.y_f + share * (inputs.y - state.y_f)
-    return State(
-        state.i + h * (R_T.T @ grows), y_f, state.dy_f + share * (inputs.dy_d - state.dy_f)
-    )
+    return State(i, y_f, state.dy_f + share * (inputs.dy_d - state.dy_f))
 
 
 def outputs(parameters: Parameters, derived: tuple[Triple, Triple]) -> Outputs:

@@ -23,13 +23,13 @@ from typing import Annotated, NamedTuple
 from auv_fmu import POSITIVE, Variable, Vector
 from auv_fmu.language.quantities import ACCELERATION, EULER, POSITION, TAU, VELOCITY
 from auv_fmu.language.vectors import Vector3
-from auv_fmu.paper.point_mass import ZERO, PointMass, Triple, axes, command, limited, times
+from auv_fmu.paper.point_mass import ZERO, PointMass, Triple, axes, command, limited, times, unwound
 
 SAMPLED = True
 STOP_TIME = 10.0
 
 #: Gains to tune, with their ranges.
-GAINS = {"c": (0.2, 3.0), "L": (0.003, 3.0)}
+GAINS = {"c": (0.2, 4.0), "L": (0.003, 10.0)}
 
 
 class Parameters(NamedTuple):
@@ -88,10 +88,9 @@ def update(
     parameters: Parameters, state: State, derived: Signals, inputs: Inputs, h: float
 ) -> State:
     """Return the state h seconds later."""
-    k_2, R_T = 1.1 * parameters.L, axes(inputs.eta)
-    grows = R_T @ Vector(-copysign(k_2, x) if x != 0.0 else 0.0 for x in derived[2])
-    grows = Vector(0.0 if g * missing > 0.0 else g for g, missing in zip(grows, derived[1]))
-    return State(state.v + h * (R_T.T @ grows))
+    k_2 = 1.1 * parameters.L
+    rate = Vector(-copysign(k_2, x) if x != 0.0 else 0.0 for x in derived[2])
+    return State(state.v + h * unwound(axes(inputs.eta), rate, derived[1]))
 
 
 def outputs(parameters: Parameters, derived: Signals) -> Outputs:

@@ -36,11 +36,22 @@ Reference = Callable[[float], tuple[Any, Any, Any]]
 class Loop:
     """A law in a loop with the mass: its velocity in the body frame is v, its position y."""
 
-    def __init__(self, name: str, y: Any, dy: Any, most: float = 1e6, **gains: Any) -> None:
-        """Begin at a position [m] with a velocity [m/s], with limits of the actuators."""
+    def __init__(
+        self, name: str, y: Any, dy: Any, most: float = 1e6, mass: Any = MASS, **gains: Any
+    ) -> None:
+        """Begin at a position [m] with a velocity [m/s].
+
+        Args:
+            name: of the law.
+            y, dy: position [m] and velocity [m/s] at the start.
+            most: limit of force and moments [N, N.m].
+            mass: that the law knows [kg].
+            gains: of the law.
+
+        """
         self.law: ModuleType = load(name)
         point = self.law.Parameters().point._replace(
-            mass=Vector(MASS), drag=Vector(DRAG), ell=ELL, tau_max=(most,) * 3
+            mass=Vector(mass), drag=Vector(DRAG), ell=ELL, tau_max=(most,) * 3
         )
         self.parameters = self.law.Parameters(point=point, **gains)
         self.y, self.v = np.array(y, float), R.T @ np.array(dy, float)
@@ -200,3 +211,62 @@ def test_super_twisting_reaches_its_surface_in_finite_time_and_stays(h: float) -
             late.append(np.abs([*(s / (L * h * h)), *((loop.state.v + Vector(w(loop.t))) / L / h)]))
     # In units of L h^2 and of L h: numbers of the order of one, for each h.
     assert np.max(late) < 10.0
+
+
+def test_backstepping_has_the_energy_of_its_proof() -> None:
+    """V falls at its rate, with a constant disturbance, and all errors vanish."""
+    k_1, k_2, gamma, h = 0.8, 1.5, 0.6, 2e-3
+    w = R @ [0.3, -0.2, 0.1]
+    loop = Loop("backstepping", [1.5, 1.0, 1.5], [0.5] * 3, k_1=k_1, k_2=k_2, gamma=gamma)
+
+    def energies() -> tuple[float, float]:
+        """V and dV/dt now."""
+        y_d, dy_d, _ = moving(loop.t)
+        z_1 = loop.y - y_d
+        z_2 = R @ loop.v - dy_d + k_1 * z_1
+        wrong = w - (0.0 if loop.state is None else np.array(loop.state.w))
+        V = (k_1 * k_2 * z_1 @ z_1 + z_2 @ z_2 + wrong @ wrong / gamma) / 2.0
+        return V, -(k_1**2) * k_2 * z_1 @ z_1 - k_2 * z_2 @ z_2
+
+    seen = [energies()]
+    for _ in range(10_000):
+        loop.step(moving, h, MASS * (R.T @ w))
+        seen.append(energies())
+    V, rate = np.transpose(seen)
+    # The sampled loop is half a step late.
+    assert np.diff(V) / h == pytest.approx(rate[:-1], abs=0.005 * V[0])
+    assert V[-1] < 1e-4 * V[0]
+
+
+def test_mrac_has_the_energy_of_its_proof() -> None:
+    """Errors and wrong parameters have an energy that falls at its rate, for a wrong mass."""
+    omega, zeta, gamma, h = 1.2, 0.9, 0.8, 2e-3
+    known, w = np.array([20.0, 150.0, 200.0]), np.array([4.0, -20.0, 15.0])
+    given = {"omega": omega, "zeta": zeta, "gamma": gamma, "sigma": 0.0}
+    loop = Loop("mrac", [0.5, 0.0, -0.5], [0.3, -0.2, 0.4], mass=known, **given)
+    # What makes m dv/dt = f - d v + w the model, with f = m_0 (a + Theta Phi) + d v.
+    nothing = np.zeros(3)
+    right = np.transpose([nothing, nothing, MASS / known - 1.0, -w / known])
+    P = np.array([[omega**2 * (1 + 2 * zeta**2), zeta * omega], [zeta * omega, 1.0]])
+    Q = 2 * zeta * omega * np.diag([omega**2, 1.0])
+    A = np.array([[0.0, 1.0], [-(omega**2), -2 * zeta * omega]])
+    assert np.allclose(A.T @ P + P @ A, -Q)
+
+    def energies() -> tuple[float, float]:
+        """V and dV/dt now."""
+        y_m, dy_m, Theta = (np.array(part) for part in loop.state)
+        x = np.array([loop.y - y_m, R @ loop.v - dy_m])
+        wrong = known / MASS @ ((Theta - right) ** 2).sum(axis=1) / gamma
+        return np.trace(x.T @ P @ x) + wrong, -np.trace(x.T @ Q @ x)
+
+    loop.sample(moving)
+    # Away from the model, with which the law begins.
+    loop.state = loop.state._replace(y_m=loop.state.y_m + Vector((0.3, -0.4, 0.2)))
+    seen = [energies()]
+    for _ in range(5_000):
+        loop.step(moving, h, w)
+        seen.append(energies())
+    V, rate = np.transpose(seen)
+    # The sampled loop is half a step late.
+    assert np.diff(V) / h == pytest.approx(rate[:-1], abs=0.005 * V[0])
+    assert V[-1] < 0.5 * V[0]

@@ -25,7 +25,7 @@ ZERO = Vector((0.0, 0.0, 0.0))
 
 
 class PointMass(NamedTuple):
-    """Vehicle in the eyes of a law, by default that of Fig. 4."""
+    """Vehicle in the eyes of a law, by default the one of Fig. 4."""
 
     mass: Annotated[
         Vector,
@@ -65,6 +65,22 @@ def limited(point: PointMass, force: Triple) -> Triple:
     return Vector(min(max(f, -most), most) for f, most in zip(force, largest(point)))
 
 
+def unwound(R_T: Annotated[Matrix, 3, 3], rate: Triple, missing: Triple) -> Triple:
+    """The rate of an integral that does not wind up.
+
+    Args:
+        R_T: axes of the body.
+        rate: of an integral that adds to the force, earth frame.
+        missing: what the limits took from the force [N], body frame.
+
+    Returns:
+        The rate without its part along each axis whose force would go further beyond its limit.
+
+    """
+    along = R_T @ rate
+    return R_T.T @ Vector(0.0 if r * beyond > 0.0 else r for r, beyond in zip(along, missing))
+
+
 def command(point: PointMass, force: Triple) -> Vector3:
     """(tau_u [N], tau_q, tau_r [N.m]) of a force [N] in the body frame, by (11)."""
     return force[0], -point.ell * force[2], point.ell * force[1]
@@ -73,8 +89,3 @@ def command(point: PointMass, force: Triple) -> Vector3:
 def times(a: Triple, b: Triple) -> Triple:
     """The products of the elements."""
     return Vector(x * y for x, y in zip(a, b))
-
-
-def over(a: Triple, b: Triple) -> Triple:
-    """The quotients of the elements."""
-    return Vector(x / y for x, y in zip(a, b))
