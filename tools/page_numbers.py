@@ -9,6 +9,7 @@
 `gains`        the best gains under a limit of the commands, in docs/explanation/ready-studies.md
 `roundings`    docs/explanation/batch.md: how far the indices of `batch` and `gpu` may be apart
 `studies`      the numbers below the figures of that page, from finished studies in folders
+`benchmark`    runs `auv-fmu benchmark`, and writes its table into docs/explanation/benchmark.md
 `benchmarks`   runs the commands of the files in benchmarks/results, and writes their output there
 =============  ====================================================================================
 
@@ -19,10 +20,12 @@ from several starts are bands from the smallest to the largest.
 from __future__ import annotations
 
 import argparse
+import csv
 import os
 import platform
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -49,6 +52,8 @@ from auv_fmu.remus.hull import inertia
 from auv_fmu.remus.remus100 import Parameters, RemusState, accelerations, tail_forces
 from fmus.ports.port import H_MAX
 from orchestrator import simulate
+from orchestrator.benchmark.contest import vehicles
+from orchestrator.commands.main import main as main_of_command
 from orchestrator.cosim import PortName, System, Table
 from orchestrator.machine.compilers import ROUNDED
 from orchestrator.machine.workers import cores
@@ -84,6 +89,7 @@ from orchestrator.vehicle.signals import (
     tracking_error,
     true_control_point,
 )
+from pages import filled_in
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -1095,6 +1101,51 @@ def studies(*folders: str) -> None:
             print(f"  {line}: {answer(line, runs)}")
 
 
+# The table of controllers
+
+
+def benchmark(folder: str = "results/benchmark") -> int:
+    """Make the benchmark in a folder, and write its table, picture and answer into the page.
+
+    Runs that are there are not made again.
+    """
+    if status := main_of_command(["benchmark", "--out", folder]):
+        return status
+    made, page = ROOT / folder, ROOT / "docs" / "explanation" / "benchmark.md"
+    tables = (made / "table.md").read_text(encoding="utf-8").split("\n\n")
+    with (made / "table.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["task"] == "all"]
+    text = filled_in(page, {"answer": answer_of(rows), "table": tables[2]})
+    page.write_text(text, encoding="utf-8")
+    shutil.copyfile(made / "errors.png", ROOT / "docs" / "images" / "benchmark.png")
+    return 0
+
+
+def answer_of(rows: Sequence[Mapping[str, str]]) -> str:
+    """The places of the paper's law: rows of all tasks, the best law of each vehicle first."""
+
+    def place(among: Sequence[Mapping[str, str]]) -> str:
+        names = [row["law"] for row in among]
+        return f"{names.index('paper') + 1} of {len(names)}"
+
+    titles = {name: vehicle.scenario.label for name, vehicle in vehicles().items()}
+    every = [row for row in rows if row["vehicle"] == "all"]
+    alike = [row for row in every if "velocity" not in row["sensors"]]
+    each = (
+        f"{title}: {place([row for row in rows if row['vehicle'] == name])}"
+        for name, title in titles.items()
+    )
+    [own] = [row for row in every if row["law"] == "paper"]
+    best = every[0]
+    return (
+        f"Over all vehicles and tasks the paper's law is number {place(every)}, and number "
+        f"{place(alike)} among those that measure no velocity ({'; '.join(each)}). Its late "
+        f"error is {float(own['error']):.2g} m in the median, and {100 * float(own['failed']):.2g} % of its "
+        f"runs fail. The best law has {float(best['error']):.2g} m and "
+        f"{100 * float(best['failed']):.2g} %."
+    )
+
+
 # Benchmarks
 
 
@@ -1150,6 +1201,7 @@ PAGES: Mapping[str, Callable[..., int | None]] = {
         gains,
         roundings,
         studies,
+        benchmark,
         benchmarks,
     )
 }
@@ -1161,8 +1213,8 @@ def main() -> int:
     parser.add_argument("page", choices=PAGES)
     parser.add_argument(
         "what", nargs="*",
-        help="seeds: scenarios; roundings: studies; studies: folders; benchmarks: files; "
-        "default: all",
+        help="seeds: scenarios; roundings: studies; studies: folders; benchmark: a folder; "
+        "benchmarks: files; default: all",
     )  # fmt: skip
     parser.add_argument(
         "--runs", type=int, metavar="N", help="seeds, roundings: runs; gains: searches of each"

@@ -266,7 +266,7 @@ def loop_of(law: Law, vehicle: Vehicle, gains: Mapping[str, float]) -> tuple[Sce
 
 
 def members(law: Law, gains: Mapping[str, float]) -> dict[str, float]:
-    """Return gains by the parameters of the loop; a group's value is that of all its members.
+    """Return gains by the parameters of the loop; all members of a group have its value.
 
     Raises:
         InputError: the law has no such parameter.

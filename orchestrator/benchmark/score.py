@@ -1,4 +1,4 @@
-"""What the benchmark says of a run: error, effort, saturation and chatter."""
+"""Indices of the benchmark: error, effort, saturation and chatter of a run."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ class Inputs(NamedTuple):
 class State(NamedTuple):
     """Sums over the steps so far; commands are shares of their limits."""
 
-    squares: float  #: of the error in the second half [m2]
+    squares: float  #: sum of the squared errors in the second half [m2]
     rows: int  #: in the second half
     largest: float  #: error in the second half [m]
     energy: float  #: mean square of the limited commands, times the number of steps
     saturated: int  #: steps with a command beyond its limit
-    variation: float  #: of the limited commands
+    variation: float  #: total variation of the limited commands
     shares: Annotated[Vector, 3]  #: limited commands of the last step
     steps: int
 

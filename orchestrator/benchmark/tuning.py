@@ -2,7 +2,7 @@
 
 Candidates are drawn in rounds, each by a Latin hypercube in the logarithms of the gains. The first
 round searches the whole ranges, and includes the law's own values. Each later round searches a box
-around the best candidate so far, half as wide as that of the round before. A candidate costs the
+around the best candidate so far, half as wide as in the round before. A candidate costs the
 mean of its runs: all tasks, with draws that the benchmark does not use.
 """
 
@@ -35,7 +35,7 @@ from orchestrator.studies.sweep import Means, Ready, making_runs, prepare_study
 
 
 class Budget(NamedTuple):
-    """How long gains are searched.
+    """Extent of a search.
 
     Attributes:
         rounds: of candidates.
@@ -93,7 +93,7 @@ def search(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> dict[str
 
 
 def digest(law: Law, vehicle: Vehicle, budget: Budget) -> str:
-    """Return a hash of what a search depends on, but for the equations of bundled components."""
+    """Return a hash of all that a search depends on, except the bundled components."""
     files = sorted(Path(__file__).parent.glob("components/*.py"))
     own = [digest_at(file) for file in (*files, Path(cost.__file__))]
     content = (law.digest, {**law.gains}, vehicle.scenario.digest, vehicle.study.sample)
@@ -114,7 +114,7 @@ def _prepared(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> Ready
 
 
 def _own(law: Law, ready: Ready) -> np.ndarray:
-    """Return the logarithms of the law's own gains; of a group, that of the first member."""
+    """Return the logarithms of the law's own gains; a group has its first member's."""
     [prepared] = ready.space.prepared.values()
     firsts = (next(iter(members(law, {name: 0.0}))) for name in law.gains)
     values: Any = [prepared.system.value(PortName.read(name)) for name in firsts]

@@ -47,7 +47,7 @@ class Choice:
     )
     law: str | None = option(
         None,
-        "only these laws, and yours, with commas between them; default: all",
+        "only these laws besides your own, with commas between them; default: all",
         metavar="NAME,...",
     )
     task: str | None = option(
@@ -55,7 +55,7 @@ class Choice:
     )
     runs: int = option(1000, "number of disturbances of each task and vehicle; default: 1000")
     tune: bool = option(
-        False, "search the gains of your laws first, or of all laws without one of yours"
+        False, "search the gains first: of your own laws, or, if you name none, of all"
     )
     workers: int | None = option(None, "how many runs are made at a time; default: one per core")
     force: bool = option(False, FORCE)

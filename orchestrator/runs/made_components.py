@@ -1,4 +1,4 @@
-"""Components of a scenario that are no FMUs: scripts of components, and tracks.
+"""FMUs of the scripts and tables among the components of a scenario.
 
 Their FMUs are made once, and kept in the user's cache folder.
 
@@ -31,7 +31,7 @@ from orchestrator.runs.bundle import (
 from orchestrator.runs.scenario import Scenario
 from orchestrator.runs.tracks import planner
 
-#: What makes the FMU of a file, by its ending.
+#: Endings of scripts and of tables with tracks.
 SCRIPT, TRACK = ".py", ".csv"
 
 

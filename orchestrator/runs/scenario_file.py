@@ -164,7 +164,7 @@ class ScenarioFile(TomlTable):
         "FMUs that replace the closed loop's own, or are added to them, as "
         '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
         "this file. The path of a .py file stands for the FMU of this "
-        "[component](../explanation/component.md), that of a .csv file for a planner that "
+        "[component](../explanation/component.md), and a .csv file for a planner that "
         "[follows the table](../how-to/trajectories.md). `false` removes a component, and its "
         "wires.",
         "none",

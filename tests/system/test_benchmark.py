@@ -90,7 +90,7 @@ def module(name: str) -> ModuleType:
 
 
 @pytest.mark.parametrize("vehicle", ["auv", *slow("bluerov", "remus")])
-def test_runs_equal_those_of_fmus(vehicle: str):
+def test_fmus_make_the_same_runs(vehicle: str):
     """In every task, bit for bit."""
     made = ready("pd", vehicle, 1)
     assert isinstance(made.engine, BatchEngine)
@@ -220,7 +220,7 @@ def test_sensors_have_their_noise_and_hold_what_is_lost():
 # Statistics
 
 
-def test_statistics_are_those_of_numpy_and_scipy():
+def test_numpy_and_scipy_give_the_same_statistics():
     random = np.random.default_rng(1)
     errors = random.exponential(size=101)
     assert quantiles(errors) == (np.median(errors), *np.sort(errors)[[5, 95]])
@@ -347,7 +347,7 @@ def test_its_gains_are_searched_once(mine: Path, capsys, monkeypatch):
         ("def outputs(", "def outputs((", "my_law.py line 32"),
     ],
 )
-def test_what_cannot_be_a_law_is_refused_in_a_line(mine: Path, capsys, old, new, words):
+def test_a_component_that_cannot_be_a_law_is_refused_in_a_line(mine: Path, capsys, old, new, words):
     mine.write_text(LAW.replace(old, new))
     assert main(COMMAND) == 2
     error = capsys.readouterr().err.splitlines()[-1]

@@ -10,7 +10,7 @@
 `sensor_loss`  the helix, while the position is lost for some seconds
 =============  ==================================================================================
 
-All references begin at the same point, but for the step, and at the speed of the vehicle towards
+All references begin at the same point, except in the step, and at the speed of the vehicle towards
 north. In tasks without a current the water moves at a share of its velocity.
 """
 
@@ -95,7 +95,7 @@ class Inputs(NamedTuple):
 
 
 class Derived(NamedTuple):
-    """What follows from the parameters."""
+    """Path and waves."""
 
     waypoints: Waypoints
     components: Components

@@ -20,13 +20,13 @@ class Parameters(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """What a law asks for."""
+    """The command of a law."""
 
     command: Annotated[Vector, 3, Variable(UNITS, "Wanted force and moments")]
 
 
 class Outputs(NamedTuple):
-    """What the vehicle gets."""
+    """The command that reaches the vehicle."""
 
     tau: Annotated[Vector, 3, Variable(UNITS, "Force and moments within the limits")]
 

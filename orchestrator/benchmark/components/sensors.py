@@ -1,8 +1,7 @@
 """The sensors between a vehicle and a law: noise, and losses.
 
 Position, velocity and attitude have independent white noise at each step. While the position is
-lost, its sensor holds the last value, without noise; so does that of the velocity, if it is lost
-with it.
+lost, its sensor holds the last value, without noise. The velocity may be lost at the same time.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ class Inputs(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What sensors show."""
+    """Measured values."""
 
     y: Annotated[Vector, 3, Variable("m", "Measured control point", members=XYZ)]
     dy: Annotated[Vector, 3, Variable("m/s", "Measured velocity of it", members=XYZ)]
@@ -59,7 +58,7 @@ class Seen(NamedTuple):
 
 
 class State(NamedTuple):
-    """What sensors hold."""
+    """Last values that were measured."""
 
     y: Annotated[Vector, 3]  #: [m]
     dy: Annotated[Vector, 3]  #: [m/s]
@@ -84,7 +83,7 @@ def update(parameters: Parameters, state: State, inputs: Inputs) -> State:
 
 
 def outputs(parameters: Parameters, state: State, inputs: Inputs) -> Outputs:
-    """What sensors show, without noise."""
+    """Values without noise."""
     y_there = 1.0 - inputs.lost
     dy_there = 1.0 - inputs.lost * parameters.velocity_lost
     return Outputs(
@@ -104,7 +103,7 @@ def seed(parameters: Parameters) -> int:
 
 
 def measured(parameters: Parameters, seen: Seen, n: Annotated[Vector, 9]) -> Seen:
-    """What sensors show, with noise."""
+    """Values with noise."""
     y = parameters.position * seen.y_there
     dy = parameters.velocity * seen.dy_there
     tilt = parameters.attitude
