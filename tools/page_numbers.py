@@ -1137,12 +1137,15 @@ def answer_of(rows: Sequence[Mapping[str, str]]) -> str:
     )
     [own] = [row for row in every if row["law"] == "paper"]
     best = every[0]
+    error, failed = (
+        [f"{factor * float(row[name]):.2g}" for row in (own, best)]
+        for name, factor in (("error", 1.0), ("failed", 100.0))
+    )
     return (
         f"Over all vehicles and tasks the paper's law is number {place(every)}, and number "
-        f"{place(alike)} among those that measure no velocity ({'; '.join(each)}). Its late "
-        f"error is {float(own['error']):.2g} m in the median, and {100 * float(own['failed']):.2g} % of its "
-        f"runs fail. The best law has {float(best['error']):.2g} m and "
-        f"{100 * float(best['failed']):.2g} %."
+        f"{place(alike)} among the laws that measure no velocity ({'; '.join(each)}). Its late "
+        f"error is {error[0]} m in the median, and {failed[0]} % of its runs fail. With the best "
+        f"law, {best['law'].replace('_', ' ')}, it is {error[1]} m and {failed[1]} %."
     )
 
 

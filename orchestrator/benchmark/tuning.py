@@ -93,7 +93,7 @@ def search(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> dict[str
 
 
 def digest(law: Law, vehicle: Vehicle, budget: Budget) -> str:
-    """Return a hash of all that a search depends on, except the bundled components."""
+    """Return a hash of the law, the vehicle, the budget and the files of the benchmark."""
     files = sorted(Path(__file__).parent.glob("components/*.py"))
     own = [digest_at(file) for file in (*files, Path(cost.__file__))]
     content = (law.digest, {**law.gains}, vehicle.scenario.digest, vehicle.study.sample)
