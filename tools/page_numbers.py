@@ -5,6 +5,7 @@
 `noise`        effect of 1 mm of noise: README, reproduction.md, and remarks of scenarios
 `seeds`        effect of random seas, links and noise: remarks of scenarios, and their pages
 `remus`        docs/explanation/remus.md: changes of `remus` and `remus-pd`, and steady turns
+`bluerov`      docs/explanation/bluerov2.md: changes of `bluerov` and `bluerov-pd`, steady speeds
 `networks`     docs/tutorials/your-own-component.md: deviation of networks from onnxruntime
 `gains`        the best gains under a limit of the commands, in docs/explanation/ready-studies.md
 `roundings`    docs/explanation/batch.md: how far the indices of `batch` and `gpu` may be apart
@@ -42,6 +43,8 @@ from typing import Any
 
 import numpy as np
 
+from auv_fmu.bluerov2 import bluerov2, thruster_allocation
+from auv_fmu.bluerov2.thruster_allocation import Wanted, effect, pseudo_inverse
 from auv_fmu.loop import closed_loop
 from auv_fmu.loop.closed_loop import LongestSteps, Setting, Vehicles
 from auv_fmu.paper import motion_planner, plant
@@ -497,6 +500,7 @@ SPANS: Mapping[str, Sequence[tuple[float, float]]] = {
     "formation-change": [(25, 121)],
     "formation-lost-link": [(25, 121), (100, 121)],
     "remus": [(120, 281)],
+    "bluerov": [(0, 20), (20, 50), (65, 71)],
 }
 
 #: Runs without randomness.
@@ -519,7 +523,7 @@ def seed_numbers(scenario: str, made: Table, loops: Sequence[Loop]) -> dict[str,
     commands = [made.step_values(*loop.commanded) for loop in loops]
     found["peak command u [N]"] = max(np.abs(command[:, 0]).max() for command in commands)
     found["peak command q, r [N.m]"] = max(np.abs(command[:, 1:]).max() for command in commands)
-    if scenario == "remus":
+    if isinstance(loops[0], AllocatedLoop):
         attained = made.step_values(*(f"allocation.tau_attained.{k}" for k in ACTUATORS))
         beyond = [np.abs(commands[0] - attained) > 1e-9]
     else:
@@ -641,11 +645,7 @@ def remus_numbers(scenario: str, changes: Values) -> str:
     if result.failure is not None:
         return result.failure
     loop, late = AllocatedLoop(), result.time >= 120.0
-    error, size = tracking_error(result, loop), size_of(result, loop)
-    ahead = result.group(*loop.dy_d)
-    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True) + (ahead == 0.0).all(axis=1)[:, None]
-    beside = error - (error * ahead).sum(axis=1)[:, None] * ahead
-    across = np.linalg.norm(beside, axis=1)[late].max()
+    size, across = size_of(result, loop), beside(result, loop)[late].max()
     pairs = ((f"controller.tau.{k}", f"allocation.tau_attained.{k}") for k in "qr")
     pitch, yaw = (
         100.0 * (np.abs(np.subtract(*result.step_values(*pair).T)) > 1e-9).mean() for pair in pairs
@@ -688,6 +688,94 @@ def prestero_turn(speed: float) -> tuple[float, float, float]:
         v, r = v + 0.005 * dv, r + 0.005 * dr
         u = (speed * speed - v * v) ** 0.5
     return v, r, -6.15 * u * u * rudder
+
+
+# The BlueROV2 Heavy
+
+#: Changes, in the words of the page.
+ROV_CHANGES: Mapping[str, Values] = {
+    "nothing": {},
+    "current of 0.2 m/s across the first leg": {"plant.current.y": 0.2},
+    "not trimmed, 0.10 kg too heavy": {"plant.volume": 0.0134},
+    "ell = 0.35 m": ell(0.35),
+    "lambda = 0.5 m/s": {"controller.lambda": 0.5},
+    "lambda = 2 m/s": {"controller.lambda": 2.0},
+    "gains of the paper": {
+        "controller.K1": [10.0, 10.0, 10.0], "controller.K2": [10.0, 10.0, 10.0],
+        "controller.k_d": 50.0,
+    },
+    "k_d = 50": {"controller.k_d": 50.0},
+    "K1 = 60": {"controller.K1": [60.0, 60.0, 60.0]},
+    "gamma = 10": {"controller.gamma": 10.0},
+    "no noise": QUIET,
+    "noise of 3 mm": {STD: 0.003},
+    "noise of 1 cm": {STD: 0.01},
+    "lag of 0.15 s": {"plant.actuator.T": 0.15},
+    "damping of Wu (2018)": {
+        "plant.drag.linear.u": 4.03, "plant.drag.linear.v": 6.22, "plant.drag.linear.w": 5.18,
+        "plant.drag.linear.p": 0.07, "plant.drag.linear.q": 0.07, "plant.drag.linear.r": 0.07,
+        "plant.drag.quadratic.u": 18.18, "plant.drag.quadratic.v": 21.66,
+        "plant.drag.quadratic.w": 36.99, "plant.drag.quadratic.p": 1.55,
+        "plant.drag.quadratic.q": 1.55, "plant.drag.quadratic.r": 1.55,
+    },
+}  # fmt: skip
+
+
+def bluerov() -> None:
+    """Print a line for each change, for both controllers, and steady speeds.
+
+    The columns are the largest error in the first 20 s, from 20 s to 50 s and from 65 s on [m], the
+    part of the second across the path [m], the share of steps in which a thruster is at its limit
+    [%], the largest roll and pitch [degrees], and how far the commands of a thruster move a second,
+    in the mean of the eight [1/s].
+    """
+    columns = ("first", "later", "across", "end", "limit", "roll", "pitch", "moves")
+    heading = "".join(f"{column:>7}" for column in columns)
+    print(f"{'changed':41}{heading}  |{heading}")
+    for name, changes in ROV_CHANGES.items():
+        lacking = ("controller.K2", "controller.k_d")
+        shared = {key: value for key, value in changes.items() if key not in lacking}
+        lines = bluerov_numbers("bluerov", changes), bluerov_numbers("bluerov-pd", shared)
+        print(f"{name:41}{'  |'.join(lines)}", flush=True)
+    P = pseudo_inverse(effect(thruster_allocation.Parameters().layout))
+    water = bluerov2.Hydrodynamics()
+    wu = (4.03, 18.18), (6.22, 21.66), (5.18, 36.99)
+    for k, direction in enumerate(("ahead", "aside", "down")):
+        most = tuple(1e6 * (i == k) for i in range(3))
+        wanted = Wanted((most[0], 0.0, 0.0), (most[1], most[2], 0.0))
+        force = thruster_allocation.evaluate(thruster_allocation.Parameters(), P, wanted)
+        ours = water.linear[k], water.quadratic[k]
+        speeds = (steady_speed(*pair, force.tau_attained[k]) for pair in (ours, wu[k]))
+        print(f"{direction}: at most {force.tau_attained[k]:.0f} N, at which the speed is "
+              f"{' m/s, of Wu (2018) '.join(f'{x:.2f}' for x in speeds)} m/s")  # fmt: skip
+
+
+def steady_speed(linear: float, quadratic: float, force: float) -> float:
+    """The speed at which a drag equals a force [m/s]."""
+    return (-linear + (linear**2 + 4.0 * quadratic * force) ** 0.5) / (2.0 * quadratic)
+
+
+def bluerov_numbers(scenario: str, changes: Values) -> str:
+    """Numbers of a run in a line."""
+    result = simulate(scenario, changes)
+    if result.failure is not None:
+        return result.failure
+    loop, time = AllocatedLoop(), result.time
+    size, later = size_of(result, loop), (time >= 20.0) & (time <= 50.0)
+    commands = result.step_values(*(f"allocation.command[{k}]" for k in range(1, 9)))
+    limited = 100.0 * (np.abs(commands) > 1.0 - 1e-9).any(axis=1).mean()
+    moves = np.abs(np.diff(commands, axis=0)).sum(axis=0).mean() / time[-1]
+    roll, pitch = (np.degrees(np.abs(result[f"plant.eta.{k}"]).max()) for k in ("phi", "theta"))
+    errors = (size[time < 20.0], size[later], beside(result, loop)[later], size[time >= 65.0])
+    largest = "".join(f"{error.max():7.3f}" for error in errors)
+    return f"{largest}{limited:7.1f}{roll:7.1f}{pitch:7.1f}{moves:7.2f}"
+
+
+def beside(made: Table, loop: Loop) -> np.ndarray:
+    """Norms of the tracking error across the path, in all rows [m]."""
+    error, ahead = tracking_error(made, loop), made.group(*loop.dy_d)
+    ahead /= np.linalg.norm(ahead, axis=1, keepdims=True) + (ahead == 0.0).all(axis=1)[:, None]
+    return np.asarray(np.linalg.norm(error - (error * ahead).sum(axis=1)[:, None] * ahead, axis=1))
 
 
 # Networks
@@ -1200,6 +1288,7 @@ PAGES: Mapping[str, Callable[..., int | None]] = {
         noise,
         seeds,
         remus,
+        bluerov,
         networks,
         gains,
         roundings,

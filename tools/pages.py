@@ -107,6 +107,7 @@ _GROUPS = {
         "backstepping": "sampled, a shared function, `derive`",
         "mrac": "sampled, matrix as state, a state as rate",
         "pd_plus": "sampled, no state, groups of parameters",
+        "predictive": "sampled, matrices as constants, optimisation",
         "pid_law": "sampled, filter memory, `derive`",
         "super_twisting": "sampled, `copysign`, a name for a type",
     },

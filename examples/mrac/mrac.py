@@ -18,9 +18,9 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Matrix, Variable, Vector
-from auv_fmu.language.quantities import ACCELERATION, EULER, POSITION, TAU, VELOCITY
+from auv_fmu.language.quantities import TAU
 from auv_fmu.language.vectors import Vector3
-from auv_fmu.paper.point_mass import ZERO, PointMass, Triple, axes, command, limited, times
+from auv_fmu.paper.point_mass import Inputs, PointMass, Triple, axes, command, limited, times
 
 SAMPLED = True
 STOP_TIME = 10.0
@@ -37,17 +37,6 @@ class Parameters(NamedTuple):
     gamma: Annotated[float, Variable("1/s2", "Gain of the adaptation", POSITIVE)] = 0.5
     sigma: Annotated[float, Variable("m/s", "Leak of the adaptation", 0.0)] = 0.01
     point: Annotated[PointMass, Variable(name="")] = PointMass()
-
-
-class Inputs(NamedTuple):
-    """Measurement and reference."""
-
-    y: Annotated[Vector, 3, Variable(POSITION, "Measured control point")] = ZERO
-    eta: Annotated[Vector3, Variable(EULER, "Measured Euler angle")] = (0.0, 0.0, 0.0)
-    dy: Annotated[Vector, 3, Variable(VELOCITY, "Measured velocity")] = ZERO
-    y_d: Annotated[Vector, 3, Variable(POSITION, "Desired control point")] = Vector((1.0, 0.0, 0.0))
-    dy_d: Annotated[Vector, 3, Variable(VELOCITY, "Desired velocity")] = ZERO
-    ddy_d: Annotated[Vector, 3, Variable(ACCELERATION, "Desired acceleration")] = ZERO
 
 
 class State(NamedTuple):

@@ -21,9 +21,19 @@ from math import copysign, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Variable, Vector
-from auv_fmu.language.quantities import ACCELERATION, EULER, POSITION, TAU, VELOCITY
+from auv_fmu.language.quantities import TAU
 from auv_fmu.language.vectors import Vector3
-from auv_fmu.paper.point_mass import ZERO, PointMass, Triple, axes, command, limited, times, unwound
+from auv_fmu.paper.point_mass import (
+    ZERO,
+    Inputs,
+    PointMass,
+    Triple,
+    axes,
+    command,
+    limited,
+    times,
+    unwound,
+)
 
 SAMPLED = True
 STOP_TIME = 10.0
@@ -38,17 +48,6 @@ class Parameters(NamedTuple):
     c: Annotated[float, Variable("1/s", "Rate of the error while s is zero", POSITIVE)] = 0.7
     L: Annotated[float, Variable("m/s3", "Largest rate of the disturbance", POSITIVE)] = 0.1
     point: Annotated[PointMass, Variable(name="")] = PointMass()
-
-
-class Inputs(NamedTuple):
-    """Measurement and reference."""
-
-    y: Annotated[Vector, 3, Variable(POSITION, "Measured control point")] = ZERO
-    eta: Annotated[Vector3, Variable(EULER, "Measured Euler angle")] = (0.0, 0.0, 0.0)
-    dy: Annotated[Vector, 3, Variable(VELOCITY, "Measured velocity")] = ZERO
-    y_d: Annotated[Vector, 3, Variable(POSITION, "Desired control point")] = Vector((1.0, 0.0, 0.0))
-    dy_d: Annotated[Vector, 3, Variable(VELOCITY, "Desired velocity")] = ZERO
-    ddy_d: Annotated[Vector, 3, Variable(ACCELERATION, "Desired acceleration")] = ZERO
 
 
 class State(NamedTuple):

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
+from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from auv_fmu import Vector
@@ -244,7 +246,7 @@ def test_mrac_has_the_energy_of_its_proof() -> None:
     known, w = np.array([20.0, 150.0, 200.0]), np.array([4.0, -20.0, 15.0])
     given = {"omega": omega, "zeta": zeta, "gamma": gamma, "sigma": 0.0}
     loop = Loop("mrac", [0.5, 0.0, -0.5], [0.3, -0.2, 0.4], mass=known, **given)
-    # What makes m dv/dt = f - d v + w the model, with f = m_0 (a + Theta Phi) + d v.
+    # With these, m dv/dt = f - d v + w is the model for f = m_0 (a + Theta Phi) + d v.
     nothing = np.zeros(3)
     right = np.transpose([nothing, nothing, MASS / known - 1.0, -w / known])
     P = np.array([[omega**2 * (1 + 2 * zeta**2), zeta * omega], [zeta * omega, 1.0]])
@@ -270,3 +272,36 @@ def test_mrac_has_the_energy_of_its_proof() -> None:
     # The sampled loop is half a step late.
     assert np.diff(V) / h == pytest.approx(rate[:-1], abs=0.005 * V[0])
     assert V[-1] < 0.5 * V[0]
+
+
+def test_predictive_law_is_the_regulator_of_its_horizon_without_limits() -> None:
+    """The gain of the Riccati recursion over the moves, with a discrete model by scipy."""
+    omega, moves = 1.7, 12
+    T = 4.0 / omega / moves
+    step = expm(T * np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]]))
+    A, B = step[:2, :2], step[:2, 2:]
+    Q, cost = np.diag([1.0, 0.0]), omega**-4
+    P = Q
+    for k in range(moves):
+        gain = np.linalg.solve(B.T @ P @ B + cost, B.T @ P @ A)
+        P = (Q if k < moves - 1 else 0.0) + A.T @ P @ (A - B @ gain)
+    loop = Loop("predictive", [3.0, -1.0, 2.0], [0.2, 0.9, -1.0], omega=omega)
+    y_d, dy_d, ddy_d = moving(0.0)
+    e, de = R.T @ (loop.y - y_d), loop.v - R.T @ dy_d
+    u = -(gain @ [e, de])[0]
+    assert loop.sample(moving) == pytest.approx(MASS * (u + R.T @ ddy_d) + DRAG * loop.v, rel=1e-9)
+
+
+def test_predictive_law_has_the_best_plan_within_the_limits() -> None:
+    """First moves against scipy's bounded least squares, for random errors and limits."""
+    law, rng = load("predictive"), np.random.default_rng(1)
+    stacked = np.vstack([law.G, np.eye(law.N)])
+    wrong = []
+    for _ in range(300):
+        x, (low, high) = rng.normal(size=2) * 2.0, rng.uniform((-1.0, 0.1), (-0.1, 1.0))
+        right = np.append(-np.array(law.S) @ x, np.zeros(law.N))
+        best = lsq_linear(stacked, right, (low, high), tol=1e-12).x[0]
+        wrong.append(abs(law.first(*x, low, high) - best) / (high - low))
+    # A few plans need more than ROUNDS steps of the gradient method.
+    assert np.quantile(wrong, 0.95) < 1e-9
+    assert max(wrong) < 0.03

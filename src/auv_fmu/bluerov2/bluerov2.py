@@ -1,7 +1,7 @@
 """The BlueROV2 Heavy, an underwater vehicle with eight thrusters, with published parameters.
 
-The model and its numbers are those of von Benzon et al. (2022), doi:10.3390/jmse10121898; the page
-of the component has the source of each number. Not in the paper. Everything refers to the centre of
+The model and its numbers are from von Benzon et al. (2022), doi:10.3390/jmse10121898; the page of
+the component has the source of each number. Not in the paper. Everything refers to the centre of
 mass, the origin of the body frame: x forward, y to starboard, z down.
 """
 

@@ -18,8 +18,9 @@ from auv_fmu.language.vectors import Vector3, Vector6
 #: Force and moments that a controller of the paper does not command.
 OTHER: Members = {member: unit for member, unit in TAU_W.items() if member not in TAU}
 
-#: Largest difference of a product of B and its pseudo-inverse from the identity.
-_ROUNDING = 1e-6
+#: Damping of the pseudo-inverse in a check, and the share of a force or moment that may then lack.
+#: Together they refuse thrusters that reach a direction with arms below 1 mm.
+_DAMPING, _LACKING = 1e-9, 1e-3
 
 
 class Parameters(NamedTuple):
@@ -55,14 +56,17 @@ def effect(layout: Layout) -> Annotated[Matrix, 6, COUNT]:
     ).T
 
 
-def pseudo_inverse(B: Annotated[Matrix, 6, COUNT]) -> Annotated[Matrix, COUNT, 6]:
-    """The matrix P = B' (B B')^-1.
+def pseudo_inverse(
+    B: Annotated[Matrix, 6, COUNT], damping: float = 0.0
+) -> Annotated[Matrix, COUNT, 6]:
+    """The matrix P = B' (B B' + damping I)^-1, without damping the pseudo-inverse of B.
 
     Args:
-        B: force and moment per thrust, of full rank.
+        B: force and moment per thrust; without damping, of full rank.
+        damping: above 0, P exists for any B, and B P lacks what B does not reach.
 
     """
-    G = B @ B.T
+    G = B @ B.T + Matrix((damping if i == k else 0.0 for i in range(6)) for k in range(6))
     G_inverse = Matrix(solve(G, Vector(1.0 if i == k else 0.0 for i in range(6))) for k in range(6))
     return B.T @ G_inverse
 
@@ -71,15 +75,14 @@ def check(layout: Layout) -> None:
     """Refuse thrusters that cannot push in all six directions.
 
     Raises:
-        Refusal: B has no pseudo-inverse.
+        Refusal: a direction is not reached.
 
     """
     B = effect(layout)
-    product = B @ pseudo_inverse(B)
-    for i in range(6):
-        for k in range(6):
-            if not abs(product[i, k] - (1.0 if i == k else 0.0)) <= _ROUNDING:
-                raise Refusal("the thrusters do not reach all six directions")
+    reached = B @ pseudo_inverse(B, _DAMPING)
+    for k in range(6):
+        if not reached[k, k] >= 1.0 - _LACKING:
+            raise Refusal("the thrusters do not reach all six directions")
 
 
 def evaluate(parameters: Parameters, P: Annotated[Matrix, COUNT, 6], wanted: Wanted) -> Allocated:

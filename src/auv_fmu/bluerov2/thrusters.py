@@ -2,8 +2,8 @@
 
 The curve is a fit to what Blue Robotics measured of a T200 at 16 V and at rest ("T200 Public
 Performance Data 10-20 V", September 2019): of 201 points the largest error is 1.9 N, at full
-command, and the root of the mean square 0.34 N. Positions and directions are those of von Benzon et
-al. (2022), doi:10.3390/jmse10121898. Not in the paper.
+command, and the root of the mean square 0.34 N. Positions and directions are from von Benzon et al.
+(2022), doi:10.3390/jmse10121898. Not in the paper.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from auv_fmu.paper.actuators import limit
 
 #: Source of the model, and the paper of the equation numbers.
 __citation__ = (
-    "The model is that of M. von Benzon et al., An Open-Source Benchmark Simulator: Control of a "
+    "The model is from M. von Benzon et al., An Open-Source Benchmark Simulator: Control of a "
     f"BlueROV2 Underwater Robot, JMSE 10(12):1898, 2022. {of_the_paper}"
 )
 
@@ -108,7 +108,7 @@ class Layout(NamedTuple):
 
 
 def thrust(curve: Curve, command: float) -> float:
-    """Steady thrust of a command [N]; beyond -1 .. 1 that of the limit.
+    """Steady thrust of a command [N], which is limited to -1 .. 1.
 
     Args:
         curve: of the thruster.
@@ -152,13 +152,10 @@ def forces(layout: Layout, thrusts: Annotated[Vector, COUNT]) -> Vector6:
 
     """
     X, Y, Z, K, M, N = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(COUNT):
-        x, y, z = layout.x[k], layout.y[k], layout.z[k]
-        f_x, f_y, f_z = (
-            layout.e_x[k] * thrusts[k],
-            layout.e_y[k] * thrusts[k],
-            layout.e_z[k] * thrusts[k],
-        )
+    for x, y, z, e_x, e_y, e_z, f in zip(
+        layout.x, layout.y, layout.z, layout.e_x, layout.e_y, layout.e_z, thrusts
+    ):
+        f_x, f_y, f_z = e_x * f, e_y * f, e_z * f
         X, Y, Z = X + f_x, Y + f_y, Z + f_z
         K, M, N = K + (y * f_z - z * f_y), M + (z * f_x - x * f_z), N + (x * f_y - y * f_x)
     return X, Y, Z, K, M, N

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu.language.arrays import Matrix, Vector
-from auv_fmu.language.quantities import TAU
+from auv_fmu.language.quantities import ACCELERATION, EULER, POSITION, TAU, VELOCITY
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import Vector3
 from auv_fmu.paper.attitude import rotation_from_euler
@@ -47,6 +47,17 @@ class PointMass(NamedTuple):
         80.0,
         80.0,
     )
+
+
+class Inputs(NamedTuple):
+    """Measurement with the velocity, and reference; by default it is a step of one metre."""
+
+    y: Annotated[Vector, 3, Variable(POSITION, "Measured control point")] = ZERO
+    eta: Annotated[Vector3, Variable(EULER, "Measured Euler angle")] = (0.0, 0.0, 0.0)
+    dy: Annotated[Vector, 3, Variable(VELOCITY, "Measured velocity of the control point")] = ZERO
+    y_d: Annotated[Vector, 3, Variable(POSITION, "Desired control point")] = Vector((1.0, 0.0, 0.0))
+    dy_d: Annotated[Vector, 3, Variable(VELOCITY, "Desired velocity")] = ZERO
+    ddy_d: Annotated[Vector, 3, Variable(ACCELERATION, "Desired acceleration")] = ZERO
 
 
 def axes(euler: Vector3) -> Annotated[Matrix, 3, 3]:
@@ -89,3 +100,8 @@ def command(point: PointMass, force: Triple) -> Vector3:
 def times(a: Triple, b: Triple) -> Triple:
     """The products of the elements."""
     return Vector(x * y for x, y in zip(a, b))
+
+
+def over(a: Triple, b: Triple) -> Triple:
+    """The quotients of the elements."""
+    return Vector(x / y for x, y in zip(a, b))
