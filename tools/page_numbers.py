@@ -1192,12 +1192,12 @@ def studies(*folders: str) -> None:
 # The table of controllers
 
 
-def benchmark(folder: str = "results/benchmark") -> int:
+def benchmark(folder: str = "results/benchmark", n: int = 1000) -> int:
     """Make the benchmark in a folder, and write its table, picture and answer into the page.
 
     Runs that are there are not made again.
     """
-    if status := main_of_command(["benchmark", "--out", folder]):
+    if status := main_of_command(["benchmark", "--runs", str(n), "--out", folder]):
         return status
     made, page = ROOT / folder, ROOT / "docs" / "explanation" / "benchmark.md"
     tables = (made / "table.md").read_text(encoding="utf-8").split("\n\n")
@@ -1309,7 +1309,10 @@ def main() -> int:
         "benchmarks: files; default: all",
     )  # fmt: skip
     parser.add_argument(
-        "--runs", type=int, metavar="N", help="seeds, roundings: runs; gains: searches of each"
+        "--runs",
+        type=int,
+        metavar="N",
+        help="seeds, roundings, benchmark: runs; gains: searches of each",
     )
     parser.add_argument(
         "--engine", choices=(BATCH, GPU), help=f"gains: what makes the runs; default: {BATCH}"

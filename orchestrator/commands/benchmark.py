@@ -57,11 +57,18 @@ class Choice:
     tune: bool = option(
         False, "search the gains first: of your own laws, or, if you name none, of all"
     )
+    candidates: int = option(
+        Budget().candidates, "candidates in each round of the search; default: 32"
+    )
     workers: int | None = option(None, "how many runs are made at a time; default: one per core")
     force: bool = option(False, FORCE)
 
     def __post_init__(self) -> None:
-        for name, n in (("runs", self.runs), ("workers", self.workers)):
+        for name, n in (
+            ("runs", self.runs),
+            ("candidates", self.candidates),
+            ("workers", self.workers),
+        ):
             if n is not None and n < 1:
                 raise InputError(f"--{name} {n}: must be at least 1")
 
@@ -132,7 +139,7 @@ def _gains(
     options: argparse.Namespace,
 ) -> dict[str, dict[str, dict[str, float]]]:
     """Return the gains of all laws by vehicle, and search those that are missing."""
-    file, budget = options.out / _GAINS, Budget()
+    file, budget = options.out / _GAINS, Budget(candidates=options.candidates)
     ours, found = read_gains(OWN_GAINS), read_gains(file)
     means = Means(workers=options.workers)
     for vehicle in on.values():

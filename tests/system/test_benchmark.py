@@ -324,15 +324,15 @@ def test_a_law_of_the_users_own_enters_the_table(mine: Path, capsys, monkeypatch
 
 
 @pytest.mark.slow
-def test_its_gains_are_searched_once(mine: Path, capsys, monkeypatch):
-    monkeypatch.setattr("orchestrator.commands.benchmark.Budget", lambda: Budget(1, 2, 1, 1))
-    assert main([*COMMAND, "--tune"]) == 0
+def test_its_gains_are_searched_once(mine: Path, capsys):
+    search = [*COMMAND, "--tune", "--candidates", "2"]
+    assert main(search) == 0
     assert "searching" in capsys.readouterr().err
     gains = contest.read_gains(mine.parent / "results" / "benchmark" / "gains.toml")
     assert gains["auv"].keys() == {"my_law"}
     record = contest.StudyResult(mine.parent / "results" / "benchmark" / "auv" / "my_law").record
     assert str(gains["auv"]["my_law"]["gains"]["k"]) in str(record)
-    assert main([*COMMAND, "--tune"]) == 0
+    assert main(search) == 0
     assert "searching" not in capsys.readouterr().err
 
 
