@@ -1224,6 +1224,8 @@ def answer_of(rows: Sequence[Mapping[str, str]]) -> str:
         for name, title in titles.items()
     )
     [own] = [row for row in every if row["law"] == "paper"]
+    tasks = next(iter(vehicles().values())).tasks
+    n = int(own["runs"]) // (len(titles) * len(tasks))
     best = every[0]
     error, failed = (
         [f"{factor * float(row[name]):.2g}" for row in (own, best)]
@@ -1233,7 +1235,8 @@ def answer_of(rows: Sequence[Mapping[str, str]]) -> str:
         f"Over all vehicles and tasks the paper's law is number {place(every)}, and number "
         f"{place(alike)} among the laws that measure no velocity ({'; '.join(each)}). Its late "
         f"error is {error[0]} m in the median, and {failed[0]} % of its runs fail. With the best "
-        f"law, {best['law'].replace('_', ' ')}, it is {error[1]} m and {failed[1]} %."
+        f"law, {best['law'].replace('_', ' ')}, it is {error[1]} m and {failed[1]} %. The numbers "
+        f"are from `auv-fmu benchmark --runs {n}`."
     )
 
 

@@ -15,7 +15,7 @@ from zipfile import ZipFile
 
 from fmus.discovery import ORIGIN, digest_at, fingerprint, name_of, origin_of
 from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE
-from orchestrator.machine.cache import category_folder
+from orchestrator.machine.cache import category_folder, users_folder
 from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError
 from orchestrator.runs.bundle import (
@@ -89,8 +89,14 @@ def _built(
     script: Path, digests: Mapping[str, str | None], kind: str, words: Sequence[str]
 ) -> Path:
     """Return the FMU of a script whose files have some digests."""
-    # Folders within this one differ only in their names.
-    place = Path(os.path.relpath(script.parent, category_folder(CATEGORY) / "key")).as_posix()
+    try:
+        # Folders within this one differ only in their names.
+        place = Path(os.path.relpath(script.parent, category_folder(CATEGORY) / "key")).as_posix()
+    except ValueError as error:
+        # Windows has no path from one drive to another.
+        raise InputError(
+            f"{script}: cannot be on another drive than {users_folder()}; build its FMU"
+        ) from error
     text = f"{words} {fingerprint(kind)} {place} {script.name} {sorted(digests.items())}"
 
     def build() -> dict[str, bytes]:
