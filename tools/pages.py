@@ -105,10 +105,11 @@ _GROUPS = {
     },
     "laws": {
         "backstepping": "sampled, a shared function, `derive`",
+        "learned_law": "matrices as parameters, `tanh`, no state",
         "mrac": "sampled, matrix as state, a state as rate",
         "pd_plus": "sampled, no state, groups of parameters",
-        "predictive": "sampled, matrices as constants, optimisation",
         "pid_law": "sampled, filter memory, `derive`",
+        "predictive": "sampled, matrices as constants, optimisation",
         "super_twisting": "sampled, `copysign`, a name for a type",
     },
     "estimators": {

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import inspect
+import shutil
+import subprocess
+import sys
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
@@ -13,7 +18,11 @@ from scipy.linalg import expm
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
-from auv_fmu import Vector
+from auv_fmu import Vector, simulate
+from fmus.kinds import NATIVE
+from orchestrator.machine.compilers import machines_compiler
+from orchestrator.runs import SCENARIOS_FOLDER
+from orchestrator.runs.own_components import build_own
 from support.examples import EXAMPLES, NAMES, load
 
 #: The laws: every example with gains to tune.
@@ -134,7 +143,8 @@ def test_error_dies_out_with_the_default_gains(name: str) -> None:
     loop = Loop(name, [3.0, -3.0, 2.5], [0.0, 0.0, 0.0], most=80.0)
     for _ in range(3000):
         loop.step(reference, 0.02)
-    assert np.linalg.norm(loop.error(reference)) < 0.03
+    # The learned law is no better than what it saw.
+    assert np.linalg.norm(loop.error(reference)) < (0.06 if name == "learned_law" else 0.03)
 
 
 def test_pid_has_the_poles_of_its_gains() -> None:
@@ -305,3 +315,72 @@ def test_predictive_law_has_the_best_plan_within_the_limits() -> None:
     # A few plans need more than ROUNDS steps of the gradient method.
     assert np.quantile(wrong, 0.95) < 1e-9
     assert max(wrong) < 0.03
+
+
+def test_learned_law_is_its_network() -> None:
+    omega, a_0 = 1.4, 0.6
+    loop = Loop("learned_law", [1.0, -2.0, 0.5], [0.3, 0.1, -0.4], omega=omega, a_0=a_0)
+    y_d, dy_d, ddy_d = moving(0.0)
+    e, de = R.T @ (loop.y - y_d), loop.v - R.T @ dy_d
+    x = np.concatenate([omega**2 * e, omega * de, omega * loop.v]) / a_0
+    u = a_0 * np.array(loop.law.W_2) @ np.tanh(np.array(loop.law.W_1) @ x)
+    expected = MASS * (u + R.T @ ddy_d) + DRAG * loop.v
+    assert loop.sample(moving) == pytest.approx(expected, rel=1e-12)
+
+
+#: Errors in the last 20 s [m] that no law exceeds with its default gains, and PID.
+SCENARIOS = {"fig4": (0.2, 0.3), "remus": (0.3, 0.3), "bluerov": (0.6, 1.5)}
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+@pytest.mark.parametrize("name", LAWS)
+def test_default_gains_are_stable_on_three_vehicles(name: str, tmp_path: Path) -> None:
+    """In the scenarios of the bundle; what the law knows is in the parameters of the planner."""
+    fmu = build_own(EXAMPLES / name, tmp_path, kind=NATIVE)
+    fields = load(name).Inputs._fields
+    for scenario, (most, most_of_pid) in SCENARIOS.items():
+        text = (SCENARIOS_FOLDER / f"{scenario}.toml").read_text()
+        table = {key: value for key, value in tomllib.loads(text).items() if key != "compare"}
+        table.setdefault("components", {})["controller"] = str(fmu)
+        wires = table.setdefault("wires", {})
+        if "dy" in fields:
+            wires["controller.dy"] = "plant.dy"
+        if "ddy_d" not in fields:
+            wires["controller.ddy_d"] = False
+        known = {"ell": ELL, "tau_max": [80.0] * 3}
+        if planner := table["parameters"].get("planner", {}):
+            ell = planner["ell"]
+            known = {
+                "ell": ell,
+                "tau_max": planner["tau_max"],
+                "mass": [planner["m11"], planner["m66"] / ell**2, planner["m55"] / ell**2],
+                "drag": [planner["d11"], planner["d66"] / ell**2, planner["d55"] / ell**2],
+            }
+        table["parameters"]["controller"] = known
+        result = simulate(table)
+        error = np.linalg.norm(result.group("plant.y") - result.group("planner.y_d"), axis=1)
+        late = error[result.time > result.time[-1] - 20.0].max()
+        assert late < (most_of_pid if name == "pid_law" else most), scenario
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(machines_compiler() is None, reason="there is no C compiler")
+def test_training_has_made_the_learned_law_better(tmp_path: Path) -> None:
+    """On vehicles that neither trained nor chose it, with the cost of the training."""
+    for name in ("learned_law.py", "train.py"):
+        shutil.copy(EXAMPLES / "learned_law" / name, tmp_path)
+    build_own(tmp_path / "learned_law.py", tmp_path, kind=NATIVE)
+    program = (
+        "import learned_law, numpy as np, train\n"
+        "from auv_fmu import Simulations\n"
+        "sims = Simulations(train.LOOP, 200)\n"
+        "drawn = train.vehicles(np.random.default_rng(7), 200)\n"
+        "learned = np.concatenate([np.ravel(learned_law.W_1), np.ravel(learned_law.W_2)])\n"
+        "for weights in (train.beginning(np.random.default_rng(1)), learned):\n"
+        "    print(train.costs(sims, np.tile(weights, (200, 1)), drawn).mean())\n"
+    )
+    command = [sys.executable, "-c", program]
+    printed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    before, after = map(float, printed.stdout.split())
+    assert after < 0.75 * before
