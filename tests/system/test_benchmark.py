@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import tomllib
 from dataclasses import replace
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -283,6 +284,30 @@ def test_search_is_the_same_for_a_seed():
     for name, value in first["gains"].items():
         low, high, _ = law.gains[name]
         assert 0.999 * low <= value <= 1.001 * high
+
+
+def test_gains_of_the_program_are_within_the_ranges_of_its_laws():
+    known = laws()
+    for name, of_laws in contest.read_gains(contest.OWN_GAINS).items():
+        assert name in vehicles()
+        for law, found in of_laws.items():
+            assert found["gains"].keys() == known[law].gains.keys(), (name, law)
+
+
+def test_the_wheel_has_all_scripts_of_laws():
+    root = Path(contest.__file__).parents[2]
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    included = project["tool"]["hatch"]["build"]["targets"]["wheel"]["force-include"]
+    scripts = {
+        Path(law.component).relative_to(root / "examples").as_posix()
+        for law in laws().values()
+        if law.component.endswith(".py")
+    }
+    assert {
+        file.removeprefix("examples/"): place.removeprefix("orchestrator/benchmark/laws/")
+        for file, place in included.items()
+        if file.startswith("examples/")
+    } == {script: script for script in scripts}
 
 
 def test_gains_are_written_and_read_back(tmp_path: Path):
