@@ -18,6 +18,7 @@ room                contents
 :mod:`.live`        the page in which a system runs
 :mod:`.exchange`    other tools: hosts, verification of their tables
 :mod:`.studies`     many runs
+:mod:`.benchmark`   control laws compared in a table
 :mod:`.paper`       the paper's numbers and claims compared with ours
 :mod:`.commands`    the command line
 ==================  ==========================================================

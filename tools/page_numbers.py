@@ -12,6 +12,7 @@
 `roundings`    docs/explanation/batch.md: how far the indices of `batch` and `gpu` may be apart
 `consistency`  docs/explanation/navigation.md: NEES of the navigation filter over many runs
 `studies`      the numbers below the figures of that page, from finished studies in folders
+`benchmark`    runs `auv-fmu benchmark`, and writes its table into docs/explanation/benchmark.md
 `benchmarks`   runs the commands of the files in benchmarks/results, and writes their output there
 =============  ====================================================================================
 
@@ -22,10 +23,12 @@ from several starts are bands from the smallest to the largest.
 from __future__ import annotations
 
 import argparse
+import csv
 import os
 import platform
 import re
 import shlex
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -66,6 +69,8 @@ from auv_fmu.remus.remus100 import Form, RemusState, accelerations, inertia_of
 from auv_fmu.remus.tail import Tail
 from fmus.ports.port import H_MAX
 from orchestrator import Simulations, simulate
+from orchestrator.benchmark.contest import vehicles
+from orchestrator.commands.main import main as main_of_command
 from orchestrator.cosim import PortName, System, Table
 from orchestrator.machine.compilers import ROUNDED
 from orchestrator.machine.errors import InputError
@@ -102,6 +107,7 @@ from orchestrator.vehicle.signals import (
     tracking_error,
     true_control_point,
 )
+from pages import filled_in
 
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
@@ -1407,6 +1413,57 @@ def studies(*folders: str) -> None:
             print(f"  {line}: {answer(line, runs)}")
 
 
+# The table of controllers
+
+
+def benchmark(folder: str = "results/benchmark", n: int = 1000) -> int:
+    """Make the benchmark in a folder, and write its table, picture and answer into the page.
+
+    Runs that are there are not made again.
+    """
+    if status := main_of_command(["benchmark", "--runs", str(n), "--out", folder]):
+        return status
+    made, page = ROOT / folder, ROOT / "docs" / "explanation" / "benchmark.md"
+    tables = (made / "table.md").read_text(encoding="utf-8").split("\n\n")
+    with (made / "table.csv").open(encoding="utf-8", newline="") as file:
+        rows = [row for row in csv.DictReader(file) if row["task"] == "all"]
+    text = filled_in(page, {"answer": answer_of(rows), "table": tables[2]})
+    page.write_text(text, encoding="utf-8")
+    shutil.copyfile(made / "errors.png", ROOT / "docs" / "images" / "benchmark.png")
+    return 0
+
+
+def answer_of(rows: Sequence[Mapping[str, str]]) -> str:
+    """The places of the paper's law: rows of all tasks, the best law of each vehicle first."""
+
+    def place(among: Sequence[Mapping[str, str]]) -> str:
+        names = [row["law"] for row in among]
+        return f"{names.index('paper') + 1} of {len(names)}"
+
+    titles = {name: vehicle.scenario.label for name, vehicle in vehicles().items()}
+    every = [row for row in rows if row["vehicle"] == "all"]
+    alike = [row for row in every if "velocity" not in row["sensors"]]
+    each = (
+        f"{title}: {place([row for row in rows if row['vehicle'] == name])}"
+        for name, title in titles.items()
+    )
+    [own] = [row for row in every if row["law"] == "paper"]
+    tasks = next(iter(vehicles().values())).tasks
+    n = int(own["runs"]) // (len(titles) * len(tasks))
+    best = every[0]
+    error, failed = (
+        [f"{factor * float(row[name]):.2g}" for row in (own, best)]
+        for name, factor in (("error", 1.0), ("failed", 100.0))
+    )
+    return (
+        f"Over all vehicles and tasks the paper's law is number {place(every)}, and number "
+        f"{place(alike)} among the laws that measure no velocity ({'; '.join(each)}). Its late "
+        f"error is {error[0]} m in the median, and {failed[0]} % of its runs fail. With the best "
+        f"law, {best['law'].replace('_', ' ')}, it is {error[1]} m and {failed[1]} %. The numbers "
+        f"are from `auv-fmu benchmark --runs {n}`."
+    )
+
+
 # Benchmarks
 
 
@@ -1465,6 +1522,7 @@ PAGES: Mapping[str, Callable[..., int | None]] = {
         roundings,
         consistency,
         studies,
+        benchmark,
         benchmarks,
     )
 }
@@ -1476,11 +1534,14 @@ def main() -> int:
     parser.add_argument("page", choices=PAGES)
     parser.add_argument(
         "what", nargs="*",
-        help="seeds: scenarios; roundings: studies; studies: folders; benchmarks: files; "
-        "default: all",
+        help="seeds: scenarios; roundings: studies; studies: folders; benchmark: a folder; "
+        "benchmarks: files; default: all",
     )  # fmt: skip
     parser.add_argument(
-        "--runs", type=int, metavar="N", help="seeds, roundings: runs; gains: searches of each"
+        "--runs",
+        type=int,
+        metavar="N",
+        help="seeds, roundings, benchmark: runs; gains: searches of each",
     )
     parser.add_argument(
         "--engine", choices=(BATCH, GPU), help=f"gains: what makes the runs; default: {BATCH}"

@@ -35,6 +35,7 @@ _GROUPS = {
         "live": ("look", "write an interactive page: move sliders, watch the loop"),
         "animate": ("look", "write a film of a scenario"),
         "sweep": ("many_runs", "run a study: many runs with varied parameters"),
+        "benchmark": ("benchmark", "compare control laws in a table, also your own"),
     },
     "your own components": {
         "new": ("build", "create a component or a controller from a template"),
@@ -55,7 +56,7 @@ _GROUPS = {
 COMMANDS = {name: what for group in _GROUPS.values() for name, what in group.items()}
 
 #: Commands that are quick, or show their progress themselves.
-_SHOWN = {"hosts", "list", "report", "run", "sweep"}
+_SHOWN = {"benchmark", "hosts", "list", "report", "run", "sweep"}
 
 #: Columns of the help.
 _NAMES, _WIDTH = 10, 78

@@ -45,6 +45,7 @@ from orchestrator.machine.errors import Findings, InputError
 from orchestrator.machine.identity import Identity
 from orchestrator.machine.user_files import is_folder
 from orchestrator.runs.bundle import current_fmus
+from orchestrator.runs.made_components import with_fmus
 from orchestrator.runs.request import PROGRAM, Request, SystemOptions
 from orchestrator.runs.scenario import (
     Inputs,
@@ -57,7 +58,6 @@ from orchestrator.runs.scenario import (
     scenario_of,
     shared_events,
 )
-from orchestrator.runs.tracks import with_planners
 from orchestrator.runs.wiring import check_built, closed_loop, read_wiring
 from orchestrator.vehicle.cautions import differing_vehicle
 from orchestrator.vehicle.signals import Loop, loops_of
@@ -159,7 +159,7 @@ def load_scenario(
         scenario = scenario_of(name) if isinstance(name, Mapping) else read_scenario(str(name))
         check_figure(scenario.figure)
         folder = current_fmus(kind, fmi, platforms)
-        system = closed_loop(folder, with_planners(scenario, folder, kind, platforms))
+        system = closed_loop(folder, with_fmus(scenario, folder, kind, platforms))
         scenario = replace(scenario, parameters=system.expanded(scenario.parameters))
     else:
         check_brings_its_own(str(name), kind, fmi, platforms)
@@ -514,7 +514,7 @@ def with_companion(prepared: Prepared, request: Request) -> list[Prepared]:
         parameters={},
     )
     folder = current_fmus(request.kind)
-    system = closed_loop(folder, with_planners(companion, folder, request.kind))
+    system = closed_loop(folder, with_fmus(companion, folder, request.kind))
     fed = {connection.target for connection in system.connections}
 
     def shared(values: Mapping[PortName, Any]) -> dict[PortName, Any]:

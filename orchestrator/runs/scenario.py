@@ -293,7 +293,7 @@ def _read_system(content: dict[str, Any], folder: Path, vehicles: int | None) ->
     for key in content.keys() & {"components", "wires", "steps"}:
         content[key] = for_each_vehicle(vehicles, content[key])
     content["components"] = {
-        component: str(folder / fmu) if str(fmu).endswith((".fmu", ".csv")) else fmu
+        component: str(folder / fmu) if str(fmu).endswith((".fmu", ".py", ".csv")) else fmu
         for component, fmu in content.get("components", {}).items()
     }
 

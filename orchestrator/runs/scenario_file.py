@@ -164,7 +164,8 @@ class ScenarioFile(TomlTable):
     components: dict[str, Name | Literal[False]] = entry(
         "FMUs that replace the closed loop's own, or are added to them, as "
         '`component = "FMU"`: a name of the bundle\'s, or the path of a .fmu file, relative to '
-        "this file. The path of a .csv file stands for a planner that "
+        "this file. The path of a .py file stands for the FMU of this "
+        "[component](../explanation/component.md), and a .csv file for a planner that "
         "[follows the table](../how-to/trajectories.md). `false` removes a component, and its "
         "wires.",
         "none",

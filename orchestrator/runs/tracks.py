@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -16,20 +15,10 @@ from pathlib import Path
 import numpy as np
 
 from fmus.discovery import fingerprint, name_of
-from fmus.kinds import AUTO, FMI_VERSIONS, NATIVE
 from orchestrator.machine.disk import temporary_folder
 from orchestrator.machine.errors import InputError, escape_unprintable
 from orchestrator.machine.texts import finite, in_docstring
-from orchestrator.runs.bundle import (
-    LOG,
-    Form,
-    best_kind,
-    kept_fmus,
-    run_fmus,
-    settings_of,
-    words_of,
-)
-from orchestrator.runs.scenario import Scenario
+from orchestrator.runs.bundle import LOG, kept_fmus, run_fmus
 from orchestrator.runs.tables import places_of_time, records, time_of
 from orchestrator.vehicle.signals import AXES
 
@@ -39,40 +28,18 @@ _FEWEST, _MOST = 4, 20_000
 _TEMPLATE = Path(__file__).with_name("templates") / "component" / "track.py.txt"
 
 
-def with_planners(
-    scenario: Scenario, folder: Path, kind: str, targets: str | None = None
-) -> Scenario:
-    """Replace the tables among the components of a scenario by FMUs of planners that follow them.
+def planner(table: Path, kind: str, words: Sequence[str]) -> Path:
+    """Return the FMU of a planner that follows a table.
 
     Args:
-        scenario: whose components may be tables.
-        folder: of the bundle's FMUs; those of the planners have the same kind.
-        kind: that was asked for; with `auto`, planners are of the Python kind where there is no
-            compiler.
-        targets: the platforms of the planners, with commas between them; None: this machine.
+        table: with the track.
+        kind: of the FMU.
+        words: options of its build.
 
     Raises:
-        InputError: a table cannot be read, or is not a track.
+        InputError: the table cannot be read, or is not a track.
 
     """
-    tables = {
-        component: Path(str(file))
-        for component, file in scenario.components.items()
-        if str(file).endswith(".csv")
-    }
-    if not tables:
-        return scenario
-    settings = settings_of(folder)
-    made, fmi = settings["kind"], settings.get("fmi", FMI_VERSIONS[0])
-    if kind == AUTO and made == NATIVE:
-        made = best_kind(fmi)
-    words = tuple(words_of(Form(kind=made, fmi=fmi, platforms=targets)))
-    planners = {component: str(_planner(table, made, words)) for component, table in tables.items()}
-    return replace(scenario, components={**scenario.components, **planners})
-
-
-def _planner(table: Path, kind: str, words: Sequence[str]) -> Path:
-    """Return the FMU of a planner that follows a table."""
     word = re.sub(r"\W+", "_", table.stem.lower(), flags=re.ASCII).strip("_")
     module = f"{word}_planner" if word[:1].isalpha() else f"track_{word}_planner"
     text = planner_text(name_of(module), read_track(table), table.name)

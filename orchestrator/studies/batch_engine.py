@@ -55,7 +55,7 @@ from orchestrator.vehicle.indices import INDICES, SMALLEST_DISTANCE, prefixed
 from orchestrator.vehicle.signals import loops_of
 
 #: Advice for systems that this engine cannot run.
-_ADVICE = "use --engine fmu"
+ADVICE = "use --engine fmu"
 
 #: Failure of a run that the program has refused; it is repeated with FMUs, which give a reason.
 REFUSED = "refused"
@@ -400,7 +400,7 @@ class BatchEngine:
             try:
                 self._programs[name] = _Programs(system, own, runners)
             except InputError as error:
-                raise InputError(f"{name}: {error}; {_ADVICE}") from None
+                raise InputError(f"{name}: {error}; {ADVICE}") from None
 
     @property
     def digest(self) -> str:
@@ -419,7 +419,7 @@ class BatchEngine:
             if is_here:
                 compiled.program  # noqa: B018
         except InputError as error:
-            raise InputError(f"{point.scenario}: {error}; {_ADVICE}") from None
+            raise InputError(f"{point.scenario}: {error}; {ADVICE}") from None
 
     def outcomes(self, points: Points) -> Iterator[Outcomes]:
         """Make runs, some at a time."""

@@ -107,7 +107,7 @@ def read_own_index(path: Path) -> OwnIndex:
 
 
 def own_indices(study: Study, systems: Mapping[str, System]) -> tuple[OwnIndex, ...]:
-    """Return the user's own indices that the figures of a study show.
+    """Return the user's own indices that a study names, or that its figures show.
 
     Args:
         study: in the folder of the files.
@@ -118,8 +118,6 @@ def own_indices(study: Study, systems: Mapping[str, System]) -> tuple[OwnIndex, 
             has.
 
     """
-    if study.folder is None:
-        return ()
     loops = {name: loops_of(system) for name, system in systems.items()}
     known = [*study.varied, *chain(*map(index_columns, loops.values()))]
     unknown = (value for value in _shown(study) if not is_known(value, known))
@@ -135,10 +133,10 @@ def own_indices(study: Study, systems: Mapping[str, System]) -> tuple[OwnIndex, 
         if name.startswith(prefix) and (match := _STEM.match(name, len(prefix)))
     }
     findings, every = Findings(), list[OwnIndex]()
-    for stem in stems:
-        path = study.folder / f"{stem}.py"
-        # A file may also belong to a component.
-        if stem not in components and path.is_file():
+    # A file may also belong to a component.
+    beside = [stem for stem in stems if study.folder and stem not in components]
+    for path in (*study.indices, *(Path(study.folder or "", f"{stem}.py") for stem in beside)):
+        if path.is_file():
             with findings.collecting():
                 own = read_own_index(path)
                 _check_names(path, own, every)

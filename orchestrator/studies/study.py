@@ -145,6 +145,9 @@ class Study:
         vary: values by `component.parameter`, in the order of the file.
         ranges: of the values in `vary` that lie between two ends, by name.
         folder: of the file; None without a file.
+        indices: files of indices that no figure need show.
+        draws: False if it draws no figures.
+        explains: False if runs that a program refuses are not repeated by FMUs for the reason.
 
     """
 
@@ -162,6 +165,9 @@ class Study:
     sample: Sample | None = None
     figures: Mapping[str, Any] = field(default_factory=dict)
     folder: Path | None = None
+    indices: Sequence[Path] = ()
+    draws: bool = True
+    explains: bool = True
 
     @property
     def stem(self) -> str:

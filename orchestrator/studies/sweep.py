@@ -12,7 +12,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -70,6 +70,9 @@ _PATIENCE = 0.5
 
 #: Advice for a machine without a graphics card.
 _INSTEAD = f"--engine {BATCH} makes the same runs on all cores"
+
+#: Scenarios and their systems, by the names of the scenarios.
+Systems: TypeAlias = Mapping[str, tuple[Scenario, System]]
 
 #: Name of a study without a file.
 _NAMELESS = "study"
@@ -185,6 +188,7 @@ def complete_study(
     say: Callable[[str], None] = lambda _: None,
     progress: bool = False,
     functions: Sequence[OwnFunction] = (),
+    systems: Systems | None = None,
 ) -> StudyResult:
     """Make the missing runs of a study, publish them and draw the figures.
 
@@ -196,6 +200,7 @@ def complete_study(
         say: receives notes for the user.
         progress: show a bar.
         functions: the user's own indices that are functions.
+        systems: of its scenarios; None: they are loaded.
 
     Raises:
         InputError: the study cannot be run, or its files cannot be written.
@@ -209,7 +214,7 @@ def complete_study(
     if means.points is not None:
         study = study.with_points(means.points)
     kind = _kind_begun(folder) if means.kind == AUTO else means.kind
-    ready = prepare_study(study, replace(means, kind=kind), functions)
+    ready = prepare_study(study, replace(means, kind=kind), functions, systems)
     space, engine = ready.space, ready.engine
     record = _record(study, ready, command)
     with open_store(folder, record, space.indices, means.force) as store:
@@ -220,7 +225,7 @@ def complete_study(
                 for hint in filter(None, (remark, faster(space, engine, ready.means, ready.own))):
                     say(hint)
             engines = [engine]
-            if isinstance(engine, BatchEngine):
+            if isinstance(engine, BatchEngine) and study.explains:
                 # For runs that it refuses, since it gives no reason.
                 engines.append(FmuEngine(space.prepared, means.loop, ready.own, engine.functions))
             _complete(store, engines, space, ready.means, study.name if progress else None)
@@ -252,20 +257,26 @@ class Ready(NamedTuple):
     """
 
     means: Means
-    systems: Mapping[str, tuple[Scenario, System]]
+    systems: Systems
     space: Space
     figures: Sequence[FigureEntry]
     engine: Engine
     own: Sequence[OwnIndex]
 
 
-def prepare_study(study: Study, means: Means, functions: Sequence[OwnFunction] = ()) -> Ready:
+def prepare_study(
+    study: Study,
+    means: Means,
+    functions: Sequence[OwnFunction] = (),
+    given: Systems | None = None,
+) -> Ready:
     """Check a study and prepare its runs.
 
     Args:
         study: to run.
         means: options.
         functions: the user's own indices that are functions; a run shows their columns.
+        given: systems of its scenarios; None: they are loaded.
 
     Raises:
         Refused: its runs cannot be made, or its figures cannot be drawn; with all problems.
@@ -274,7 +285,7 @@ def prepare_study(study: Study, means: Means, functions: Sequence[OwnFunction] =
     findings, systems = Findings(), dict[str, tuple[Scenario, System]]()
     for name in study.scenario:
         with findings.collecting():
-            systems[name] = load_scenario(name, means.kind)
+            systems[name] = given[name] if given else load_scenario(name, means.kind)
     findings.refuse()
     if any(scenario.digest for scenario, _ in systems.values()):
         means = replace(means, kind=_kind(settings_of(current_fmus(means.kind))["kind"]))
@@ -296,6 +307,7 @@ def prepare_study(study: Study, means: Means, functions: Sequence[OwnFunction] =
         entries = read_figures(
             study.name, figures, space.columns, space.has_scenarios, space.indices
         )
+        entries = entries if study.draws else ()
     findings.refuse()
     return Ready(means, systems, space, entries, engine, own)
 
@@ -511,7 +523,7 @@ def _complete(
             outcomes = making_runs(engine, points, scheduler=means.scheduler, workers=means.workers)
             with outcomes as blocks:
                 for block in blocks:
-                    is_refused = block.failures.has(REFUSED)
+                    is_refused = block.failures.has(REFUSED) & (engine is not engines[-1])
                     refused.add(Numbers.of(block.numbers[is_refused]))
                     store.add(block[~is_refused])
                     bar.update(len(block) - int(is_refused.sum()))

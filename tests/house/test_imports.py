@@ -27,7 +27,7 @@ FLOORS = {
     ),
     "orchestrator": (
         "machine", "cosim", "vehicle", "figures", "runs", "program", "simulation", "bridges",
-        "live", "exchange", "studies", "paper", "commands",
+        "live", "exchange", "studies", "benchmark", "paper", "commands",
     ),
     "fmus": (
         "ports", "language", "components", "kinds", "discovery", "documentation", "script",

@@ -236,6 +236,25 @@ def test_strict_refuses_an_fmu_that_is_older_than_its_script(own: Path, capsys):
         simulate("own.toml", strict=True)
 
 
+def test_a_scenario_takes_a_script_and_follows_its_changes(own: Path):
+    """Also one of a module beside the script, without a build by the user."""
+    (own / "mine.toml").write_text(SCENARIO.replace("Own.fmu", "own.py"))
+
+    def value() -> float:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            return float(simulate("mine.toml", kind="python")["mine.y"][-1])
+
+    assert value() == 30.0
+    (own / "beside.py").write_text("GAIN = 4.0\n")
+    assert value() == 60.0
+    (own / "beside.py").write_text(FILES["beside.py"], encoding="latin-1")
+    assert value() == 30.0
+    (own / "own.py").unlink()
+    with pytest.raises(ValueError, match=r"own\.py: no such file"):
+        load("mine.toml")
+
+
 @pytest.mark.parametrize(
     "content",
     [

@@ -1,0 +1,159 @@
+"""The search for gains, the same for all laws.
+
+Candidates are drawn in rounds, each by a Latin hypercube in the logarithms of the gains. The first
+round searches the whole ranges, and includes the law's own values. Each later round searches a box
+around the best candidate so far, half as wide as in the round before. A candidate costs the
+mean of its runs: all tasks, with draws that the benchmark does not use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from fmus.discovery import digest_at
+from fmus.kinds import PYTHON
+from orchestrator.benchmark import cost
+from orchestrator.benchmark.contest import (
+    Law,
+    Vehicle,
+    clear_refusals,
+    loop_of,
+    members,
+    study_of_law,
+)
+from orchestrator.benchmark.cost import COLUMNS, costs
+from orchestrator.cosim import PortName
+from orchestrator.studies.columns import Outcomes, Points
+from orchestrator.studies.study import Study
+from orchestrator.studies.sweep import Means, Ready, making_runs, prepare_study
+
+
+class Budget(NamedTuple):
+    """Extent of a search.
+
+    Attributes:
+        rounds: of candidates.
+        candidates: in each round.
+        draws: for each task and candidate.
+        seed: of the candidates; that of the draws follows from the benchmark's.
+
+    """
+
+    rounds: int = 5
+    candidates: int = 32
+    draws: int = 16
+    seed: int = 1
+
+
+def search(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> dict[str, Any]:
+    """Search the gains of a law for a vehicle.
+
+    Returns:
+        The gains, their cost and that of the law's own values, and the digest of the search.
+
+    Raises:
+        InputError: the runs cannot be made.
+
+    """
+    from scipy.stats import qmc  # noqa: PLC0415
+
+    ready = _prepared(law, vehicle, budget, means)
+    names = [*law.gains]
+    low, high = (np.log([limits[i] for limits in law.gains.values()]) for i in (0, 1))
+    own = _own(law, ready)
+    generator = np.random.default_rng(budget.seed)
+    best, least, first = own, np.inf, np.nan
+    for number in range(budget.rounds if names else 1):
+        half = 0.5 ** (number + 1) * (high - low)
+        middle = np.clip(best, low + half, high - half) if number else 0.5 * (low + high)
+        shares = qmc.LatinHypercube(max(len(names), 1), rng=generator).random(budget.candidates)
+        some = middle + (2.0 * shares[:, : len(names)] - 1.0) * half
+        if number == 0:
+            some[0] = own
+            some = some if names else some[:1]
+        found = _costs(law, ready, np.exp(some), means)
+        first = found[0] if number == 0 else first
+        if found.min() < least:
+            best, least = some[found.argmin()], float(found.min())
+    return {
+        "digest": digest(law, vehicle, budget),
+        "cost": round(least, 6),
+        "cost_of_own": round(float(first), 6),
+        "gains": {
+            name: float(f"{value:.4g}")
+            for name, value in zip(names, np.exp(best).tolist(), strict=True)
+        },
+    }
+
+
+def digest(law: Law, vehicle: Vehicle, budget: Budget) -> str:
+    """Return a hash of the law, the vehicle, the budget and the files of the benchmark."""
+    files = sorted(Path(__file__).parent.glob("components/*.py"))
+    own = [digest_at(file) for file in (*files, Path(cost.__file__))]
+    content = (law.digest, {**law.gains}, vehicle.scenario.digest, vehicle.study.sample)
+    return sha256(repr((content, vehicle.known, budget, own)).encode()).hexdigest()[:16]
+
+
+def training(study: Study) -> Study:
+    """Return a study with other draws."""
+    assert study.sample is not None
+    return replace(study, sample=study.sample._replace(seed=study.sample.seed + 1))
+
+
+def _prepared(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> Ready:
+    study = training(study_of_law(law, vehicle, budget.draws))
+    systems = {study.name: loop_of(law, vehicle, {})}
+    with clear_refusals(law):
+        return prepare_study(study, replace(means, kind=PYTHON), given=systems)
+
+
+def _own(law: Law, ready: Ready) -> np.ndarray:
+    """Return the logarithms of the law's own gains; a group has its first member's."""
+    [prepared] = ready.space.prepared.values()
+    firsts = (next(iter(members(law, {name: 0.0}))) for name in law.gains)
+    values: Any = [prepared.system.value(PortName.read(name)) for name in firsts]
+    # A gain may be zero by default.
+    own: np.ndarray = np.log(np.maximum(np.array(values, dtype=float), 1e-9))
+    return own
+
+
+def _costs(law: Law, ready: Ready, gains: np.ndarray, means: Means) -> np.ndarray:
+    """Return the mean cost of each candidate: gains (candidates, names)."""
+    points = ready.space.points(np.arange(len(ready.space)))
+    n, columns = len(points), dict[str, np.ndarray]()
+    for name, values in zip(law.gains, gains.T, strict=True):
+        columns |= dict.fromkeys(members(law, {name: 0.0}), np.repeat(values, n))
+    every = Points(
+        np.arange(n * len(gains)),
+        [case._replace(varied=(*case.varied, *columns)) for case in points.cases],
+        np.tile(points.case, len(gains)),
+        {**{k: np.tile(v, len(gains)) for k, v in points.values.items()}, **columns},
+        np.tile(points.stop_time, len(gains)),
+        np.tile(points.step, len(gains)),
+    )
+    with making_runs(ready.engine, [every], workers=means.workers) as blocks:
+        made = Outcomes.joined([*blocks])
+    made = made[np.argsort(made.numbers)]
+    numbers: Mapping[str, np.ndarray] = {
+        name: made.indices[:, made.columns.index(name)] for name in COLUMNS
+    }
+    mean: np.ndarray = costs(numbers).reshape(len(gains), n).mean(axis=1)
+    return mean
+
+
+def written(gains: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> str:
+    """Return the text of a file of gains, by vehicle and law."""
+    lines = ["# Gains of the benchmark, written by `auv-fmu benchmark --tune`."]
+    for vehicle, of_laws in gains.items():
+        for law, found in of_laws.items():
+            lines += ["", f'["{vehicle}"."{law}"]', f'digest = "{found["digest"]}"']
+            lines += [f"cost = {found['cost']!r}", f"cost_of_own = {found['cost_of_own']!r}"]
+            pairs = (f'"{name}" = {value!r}' for name, value in found["gains"].items())
+            lines.append(f"gains = {{ {', '.join(pairs)} }}")
+    return "\n".join(lines) + "\n"
