@@ -220,8 +220,8 @@ def test_the_general_half_names_no_component_and_no_port_of_this_vehicle():
     word = re.compile(rf"\b({'|'.join(words)})\b")
     dotted = "|".join(re.escape(name) for name in ports() if "." in name or "[" in name)
     port = re.compile(rf"(?<![\w.])({dotted})(?!\w)")
-    # Short names such as e, y or step are words of any program; in quotes they would be ports.
-    plain = {"bias", "step", "number", "stage", "stages"}
+    # Short names such as e, y or bias are words of any program; in quotes they would be ports.
+    plain = {"bias", "delay", "number", "stage", "stages", "step"}
     quoted = {name for name in ports() if len(name) > 1} - plain
     for path, name in modules("orchestrator"):
         if not name or name[0] not in GENERAL:

@@ -43,7 +43,7 @@ EXPECTED = {
 )
 @pytest.mark.parametrize("law", LAWS)
 def test_offset_in_a_steady_current(scenario, current, Delta, speed, until, law):
-    """Beside the first leg: Delta tan(asin(v / U)) without memory; else it has died out.
+    """On the first leg it is Delta tan(asin(v / U)) without memory; else it has died out.
 
     A dive slows the vehicle down along the leg, and the REMUS 100 slips sideways in the current.
     """
@@ -57,7 +57,7 @@ def test_offset_in_a_steady_current(scenario, current, Delta, speed, until, law)
 
 @pytest.mark.parametrize("scenario", GUIDED)
 def test_error_of_the_run_is_across_the_leg(scenario):
-    """The reference is abeam of the measured position; noise along the leg is all that differs."""
+    """The reference is abeam of the measured position; only noise along the leg differs."""
     (loop,) = loops_of(load_scenario(scenario)[1])
     for result in compared(scenario):
         across = np.hypot(result["planner.y_e"], result["planner.z_e"])
