@@ -82,7 +82,7 @@ def jacobian_of(path: Path, folder: Path) -> np.ndarray:
 #: Sensors. A standard deviation of zero draws no number, so others follow when it is above zero.
 SENSORS = ("AttitudeSensor", "DepthSensor", "Dvl", "Imu", "PositionFix")
 
-#: Components that are no functions, or that have outputs which are not Real.
+#: Components that cannot be functions, or whose outputs are not all Real.
 OTHERS = ("AcousticLink", "NavigationFilter", "Sea", *SENSORS)
 
 
