@@ -19,8 +19,9 @@ from fmus.ports.port import Port
 #: controller takes only the angles of the posture. The rule applies to one end of a connection.
 _MATCHING_RULE = {"input": "plug", "output": "bus"}
 
-#: Outputs for inputs of other names: friction depends on the velocity through the water.
-_TAKES = {"nu": "nu_r"}
+#: Outputs for inputs of other names, with their numbers of members: friction depends on all six
+#: velocities through the water. Sensors take three of them, over ground.
+_TAKES = {("nu", 6): "nu_r"}
 
 #: Corners of the icon, and the size of its unit on a screen [mm].
 _ICON = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
@@ -68,7 +69,7 @@ def _terminals(parts: Mapping[str, Sequence[Port]]) -> list[Element]:
 
 def _terminal(part: str, name: str, members: Sequence[Port], centre: int) -> Element:
     causality = members[0].causality
-    name = _TAKES.get(name, name) if causality == "input" else name
+    name = _TAKES.get((name, len(members)), name) if causality == "input" else name
     terminal = Element("Terminal", name=part + name, matchingRule=_MATCHING_RULE[causality])
     for port in members:
         SubElement(

@@ -238,7 +238,7 @@ def test_fmu_names_the_paper_as_the_citation_does(dist: Path, native: Path, name
 
 
 def test_fmus_are_small(dist: Path):
-    assert max((dist / f"{name}.fmu").stat().st_size for name in NAMES) < 360_000
+    assert max((dist / f"{name}.fmu").stat().st_size for name in NAMES) < 400_000
 
 
 def is_for_type_checkers(node: ast.AST) -> bool:

@@ -79,16 +79,21 @@ def jacobian_of(path: Path, folder: Path) -> np.ndarray:
         return it.jacobian(it.having("input"))
 
 
+#: Sensors. A standard deviation of zero draws no number, so others follow when it is above zero.
+SENSORS = ("AttitudeSensor", "DepthSensor", "Dvl", "Imu", "PositionFix")
+
+#: Components that cannot be functions, or whose outputs are not all Real.
+OTHERS = ("AcousticLink", "NavigationFilter", "Sea", *SENSORS)
+
+
 @pytest.mark.parametrize("bundle", ["native", "dist3"])
 @pytest.mark.parametrize("name", components())
 def test_derivatives_equal_differences(request, tmp_path: Path, name: str, bundle: str):
-    check(request.getfixturevalue(bundle) / f"{name}.fmu", tmp_path)
+    share = 0.4 if name in SENSORS else 0.9
+    check(request.getfixturevalue(bundle) / f"{name}.fmu", tmp_path, share)
 
 
-@pytest.mark.parametrize(
-    "name",
-    [name for name in components() if name not in ("AcousticLink", "NavigationFilter", "Sea")],
-)
+@pytest.mark.parametrize("name", [name for name in components() if name not in OTHERS])
 def test_derivatives_equal_casadis(native: Path, tmp_path: Path, name: str):
     """Another differentiation of the same text, at the start."""
     ca = pytest.importorskip("casadi")

@@ -165,7 +165,7 @@ def test_only_outputs_that_declare_the_time_depend_on_it(fmi3: Path):
     """In this vehicle, only the disturbance."""
     description = read_model_description(str(fmi3))
     found = {
-        unknown.variable.name.split(".")[0]
+        group_name(unknown.variable.name)
         for unknown in (*description.outputs, *description.initialUnknowns)
         if "time" in {known.name for known in unknown.dependencies or ()}
     }
