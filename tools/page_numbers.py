@@ -31,6 +31,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+import textwrap
 import tomllib
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -1455,13 +1456,14 @@ def answer_of(rows: Sequence[Mapping[str, str]]) -> str:
         [f"{factor * float(row[name]):.2g}" for row in (own, best)]
         for name, factor in (("error", 1.0), ("failed", 100.0))
     )
-    return (
+    text = (
         f"Over all vehicles and tasks the paper's law is number {place(every)}, and number "
         f"{place(alike)} among the laws that measure no velocity ({'; '.join(each)}). Its late "
         f"error is {error[0]} m in the median, and {failed[0]} % of its runs fail. With the best "
         f"law, {best['law'].replace('_', ' ')}, it is {error[1]} m and {failed[1]} %. The numbers "
         f"are from `auv-fmu benchmark --runs {n}`."
     )
+    return textwrap.fill(text, 100, break_on_hyphens=False)
 
 
 # Benchmarks
