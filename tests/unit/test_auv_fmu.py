@@ -50,12 +50,18 @@ SECTION_4_1 = {
     "motion_planner.Parameters": {
         "ell": 0.35, "tau_d": (5.0, 1.0, 2.0), "eta0": (0.0, 0.0, -2.0, 0.0, 0.0),
     },
+    "PointMass": {
+        "mass": pytest.approx((25.0, 15.0 / 0.35**2, 22.5 / 0.35**2), rel=1e-3),
+        "drag": pytest.approx((30.0, 20.0 / 0.35**2, 20.0 / 0.35**2), rel=1e-3),
+        "ell": 0.35, "tau_max": (80.0,) * 3,
+    },
     "Follower": {"ell": 0.35},
     "LongestSteps": dict.fromkeys(("plant", "controller", "planner"), 0.02),
     "Setting": {"h": 0.02},
 }  # fmt: skip
 NO_SAMPLE = {"age": 0.0, "fresh": False}
 OURS = {
+    "Inputs": {**dict.fromkeys(("y", "eta", "dy", "dy_d", "ddy_d"), ZERO_3), "y_d": (1.0, 0.0, 0.0)},
     "RollAxis": {"righting_roll": 5.0, "rolls": True},
     "Localisation": {"std": 0.001, "seed": 1},
     "Gains": {"printed_jacobian": False, "innovation_gate": 1.0, "form": EULER},

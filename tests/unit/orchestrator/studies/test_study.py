@@ -270,7 +270,7 @@ def test_a_figure_is_named_as_a_file_can_be():
 
 #: Ready studies that compare the controllers, and all.
 COMPARISONS = {"attraction", "robustness", "noise", "gains", "distance", "sampling"}
-NAMES = {*COMPARISONS, "formation"}
+NAMES = {*COMPARISONS, "formation", "velocity"}
 
 
 def test_ready_studies():
