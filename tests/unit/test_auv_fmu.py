@@ -61,7 +61,9 @@ SECTION_4_1 = {
 }  # fmt: skip
 NO_SAMPLE = {"age": 0.0, "fresh": False}
 OURS = {
-    "Inputs": {**dict.fromkeys(("y", "eta", "dy", "dy_d", "ddy_d"), ZERO_3), "y_d": (1.0, 0.0, 0.0)},
+    "Inputs": {
+        **dict.fromkeys(("y", "eta", "dy", "dy_d", "ddy_d"), ZERO_3), "y_d": (1.0, 0.0, 0.0),
+    },
     "RollAxis": {"righting_roll": 5.0, "rolls": True},
     "Localisation": {"std": 0.001, "seed": 1},
     "Gains": {"printed_jacobian": False, "innovation_gate": 1.0, "form": EULER},
