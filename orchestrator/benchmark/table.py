@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
+from functools import cache
 from math import isnan, nan, sqrt
 from typing import Any, NamedTuple
 
@@ -126,14 +127,20 @@ def cost_of(draws: Sequence[np.ndarray]) -> tuple[float, float, float]:
         draws: for each vehicle, the mean cost of the tasks with each draw.
 
     """
-    generator = np.random.default_rng(_SEED)
     sampled = np.zeros(_SAMPLES)
-    for values in draws:
-        n = len(values)
-        sampled += np.log(generator.multinomial(n, np.full(n, 1.0 / n), _SAMPLES) @ values / n)
+    for place, values in enumerate(draws):
+        sampled += np.log(_weights(len(values), place) @ values)
     low, high = np.exp(np.quantile(sampled / len(draws), INTERVAL)).tolist()
     middle = float(np.exp(np.mean([np.log(values.mean()) for values in draws])))
     return middle, low, high
+
+
+@cache
+def _weights(n: int, place: int) -> np.ndarray:
+    """Return the weights of n draws in each sample of the bootstrap, for the vehicle at a place."""
+    generator = np.random.default_rng((_SEED, place))
+    weights: np.ndarray = generator.multinomial(n, np.full(n, 1.0 / n), _SAMPLES) / n
+    return weights
 
 
 def share_of(count: int, n: int) -> tuple[float, float, float]:
