@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { STEPS = 1000, MOST = 16, STATE_AT = 500, REALS = 10 };
+enum { STEPS = 1000, MOST = 32, STATE_AT = 500, REALS = 10 };
 
 typedef struct {
     void (*logger)(void *, const char *, int, const char *, const char *, ...);

@@ -390,7 +390,7 @@ def test_table_is_accepted_by_verify(opened: Browser, tmp_path, capsys):
 
 def test_page_stands_by_itself_and_is_light(page: Path):
     text = page.read_text(encoding="utf-8")
-    assert len(text.encode()) < 600_000
+    assert len(text.encode()) < 700_000
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=", text)
     [policy] = re.findall(r'Content-Security-Policy" content="(.+?)"', text)
     assert policy.startswith("default-src 'none'; ")
