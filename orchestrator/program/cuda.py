@@ -27,7 +27,7 @@ _HEAD, _KERNELS = (Path(__file__).with_name(name) for name in ("card.cuh", "kern
 _INCLUDE = re.compile(r"^#include .*\n", re.MULTILINE)
 
 #: A structure made within an expression, and the address of one.
-_MADE = re.compile(r"\(([A-Z]\w*)\)\{")
+_MADE = re.compile(r"\((\w*[A-Z]\w*)\)\{")
 _ADDRESSED = re.compile(rf"&(?={_MADE.pattern})")
 
 #: The structure of all values of a run, a declaration in it, and a name with its length.
