@@ -1,7 +1,6 @@
 """FMUs of the scripts and tables among the components of a scenario.
 
-Their FMUs are made once, and kept in the user's cache folder.
-
+They are made once, and kept in the user's cache folder.
 """
 
 from __future__ import annotations

@@ -164,7 +164,7 @@ def test_remus_100_with_idle_actuators_only_loses_energy(velocity, rates, phi, t
     M = np.array([[mass.M[i, j] for j in range(6)] for i in range(6)])
     state = remus100.RemusState(NONE_3, (phi, theta, 0.0), tuple(nu), NONE_3, NONE_3)
     dnu = np.array(remus100.accelerations(vehicle, mass, state))
-    work_of_righting = np.dot(rates, hull.righting(vehicle.hull, phi, theta))
+    work_of_righting = np.dot(rates, hull.restoring(vehicle.hull, phi, theta)[1])
     scale = 1.0 + nu @ M @ nu
     assert nu @ M @ dnu - work_of_righting <= 1e-9 * scale
     assert abs(np.dot(nu, hull.coriolis(vehicle.hull, mass, tuple(nu)))) <= 1e-9 * scale**1.5

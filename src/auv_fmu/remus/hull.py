@@ -233,19 +233,27 @@ def cross_flow(hull: Hull, drag: Drag, rho: float, v: float, r: float) -> tuple[
     return force, moment
 
 
-def righting(hull: Hull, phi: float, theta: float) -> Vector3:
-    """Righting moment (p, q, r) [N.m] of a centre of mass below the centre of buoyancy."""
-    weight = hull.mass * hull.gravity
+def restoring(hull: Hull, phi: float, theta: float) -> tuple[Vector3, Vector3]:
+    """Weight and buoyancy, about the centre of buoyancy.
+
+    Args:
+        hull: of the vehicle.
+        phi, theta: roll and pitch [rad].
+
+    Returns:
+        Force (u, v, w) [N] of a buoyancy that is not the weight, and righting moment (p, q, r)
+        [N.m] of a centre of mass below the centre of buoyancy.
+
+    """
+    net, weight = hull.net_buoyancy, hull.mass * hull.gravity
     x, y, z = hull.r_bg
-    across, down = cos(theta) * sin(phi), cos(theta) * cos(phi)
+    sin_phi, cos_phi, sin_theta, cos_theta = sin(phi), cos(phi), sin(theta), cos(theta)
+    across, down = cos_theta * sin_phi, cos_theta * cos_phi
     return (
-        weight * (y * down - z * across),
-        -weight * (z * sin(theta) + x * down),
-        weight * (x * across + y * sin(theta)),
+        (net * sin_theta, -net * cos_theta * sin_phi, -net * cos_theta * cos_phi),
+        (
+            weight * (y * down - z * across),
+            -weight * (z * sin_theta + x * down),
+            weight * (x * across + y * sin_theta),
+        ),
     )
-
-
-def rising(hull: Hull, phi: float, theta: float) -> Vector3:
-    """Force (u, v, w) [N] of a buoyancy that is not the weight, at the centre of buoyancy."""
-    net = hull.net_buoyancy
-    return net * sin(theta), -net * cos(theta) * sin(phi), -net * cos(theta) * cos(phi)

@@ -29,8 +29,7 @@ from auv_fmu.remus.hull import (
     cross_flow,
     inertia,
     lift_and_drag,
-    righting,
-    rising,
+    restoring,
 )
 from auv_fmu.remus.prestero import Coefficients
 from auv_fmu.remus.tail import ACTUATOR, FASTEST, FASTEST_TURN, Tail, forces, limit_tail
@@ -139,11 +138,11 @@ def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> V
         d/dt (u, v, w, p, q, r) over ground [m/s2, rad/s2], body frame.
 
     """
-    hull, phi, theta = parameters.hull, state.euler[0], state.euler[1]
+    hull = parameters.hull
     nu_r = through_water(state)
     tau = tail_forces(parameters.tail, state)
     c = coriolis(hull, mass, nu_r)
-    g = righting(hull, phi, theta)
+    rise, g = restoring(hull, state.euler[0], state.euler[1])
     if parameters.form == COEFFICIENTS:
         water = prestero.forces(parameters.coefficients, nu_r)
         force = Vector(
@@ -158,7 +157,6 @@ def accelerations(parameters: Parameters, mass: Inertia, state: RemusState) -> V
         )
     else:
         force = on_spheroid(parameters, mass.M, nu_r, tau, c, g)
-    rise = rising(hull, phi, theta)
     dnu = solve(mass.M, force + Vector((*rise, -0.0, -0.0, -0.0)))
     r = nu_r[5]
     u_c, v_c, _ = water_in_body(state.euler[2], state.water)

@@ -17,8 +17,7 @@ from auv_fmu.remus.hull import (
     cross_flow,
     inertia,
     lift_and_drag,
-    righting,
-    rising,
+    restoring,
 )
 
 DRAG = Drag()
@@ -69,12 +68,12 @@ def test_righting_moment_is_the_slope_of_the_potential_energy(phi, theta):
     x, y, z = hull.r_bg
     down = np.array([-sin(theta), cos(theta) * sin(phi), cos(theta) * cos(phi)])
     moment = np.cross((x, y, z), hull.mass * hull.gravity * down)
-    assert righting(hull, phi, theta) == pytest.approx(moment, abs=1e-9)
+    assert restoring(hull, phi, theta)[1] == pytest.approx(moment, abs=1e-9)
 
 
 @given(phi=st.floats(-3.0, 3.0), theta=st.floats(-1.5, 1.5), psi=st.floats(-3.0, 3.0))
 def test_buoyancy_beyond_the_weight_pulls_up_in_any_attitude(phi, theta, psi):
-    force = rising(Hull(net_buoyancy=7.0), phi, theta)
+    force = restoring(Hull(net_buoyancy=7.0), phi, theta)[0]
     in_earth = rotate(rotation_from_euler(phi, theta, psi), force)
     assert in_earth == pytest.approx((0.0, 0.0, -7.0), abs=1e-12)
 
