@@ -293,7 +293,7 @@ class Component:
         return [v for v in self.variables.values() if v.causality == causality]
 
     def by_type(self, causality: str) -> dict[str, list[Variable]]:
-        """Return the variables of one causality by type, in the order of a row."""
+        """Return the variables of one causality by type, as FMI calls move them."""
         by_type: dict[str, list[Variable]] = {}
         for variable in self.having(causality):
             by_type.setdefault(variable.type, []).append(variable)

@@ -11,7 +11,7 @@ import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager
 from ctypes import Structure, c_size_t, c_void_p
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -26,7 +26,7 @@ import numpy as np
 from orchestrator.cosim.connection import PortName
 from orchestrator.cosim.experiment import Experiment
 from orchestrator.cosim.system import System
-from orchestrator.cosim.variables import TYPES, Standing, StringTable, as_float32
+from orchestrator.cosim.variables import TYPES, Standing, StringTable
 from orchestrator.machine.errors import InputError, did_you_mean, listed, unforeseen
 from orchestrator.machine.lazy import ROWS_AT_ONCE, parquet
 from orchestrator.machine.operating_system import is_still
@@ -224,8 +224,8 @@ class Blocks:
         self,
         width: int,
         observers: Sequence[Observer],
-        ours: Callable[[], AbstractContextManager[None]] = nullcontext,
-        rounded: Sequence[int] = (),
+        ours: Callable[[], AbstractContextManager[None]],
+        arrange: Callable[[np.ndarray], None],
     ) -> None:
         """Make room for one block.
 
@@ -233,7 +233,7 @@ class Blocks:
             width: number of values in a row, without the time.
             observers: take the rows.
             ours: context in which observers are called.
-            rounded: columns of values that FMUs get as Float32.
+            arrange: turns the values of some rows into those of a table, in place.
 
         """
         self._rows = np.empty((_ROWS, 1 + width))
@@ -241,8 +241,7 @@ class Blocks:
         self.block = CBlock(self._rows.ctypes.data, _ROWS)
         self.due = monotonic() + _PATIENCE
         self._told = 0
-        self._observers, self._ours = observers, ours
-        self._rounded = list(rounded)
+        self._observers, self._ours, self._arrange = observers, ours, arrange
 
     @property
     def count(self) -> int:
@@ -274,9 +273,7 @@ class Blocks:
         if n := self.block.n:
             # Counted before observers get them: an observer that fails gets no row twice.
             self.block.n = 0
-            if self._rounded:
-                values = self._values[:n]
-                values[:, self._rounded] = as_float32(values[:, self._rounded])
+            self._arrange(self._values[:n])
             with self._ours():
                 self._tell(self._rows[:n])
         self.due = monotonic() + _PATIENCE

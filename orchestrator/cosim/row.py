@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from math import isfinite
 from typing import Any
 
@@ -16,7 +16,9 @@ from orchestrator.cosim.variables import (
     Standing,
     StringTable,
     Value,
+    Variable,
     are_of,
+    as_float32,
     references_of,
 )
 
@@ -29,16 +31,16 @@ FACTOR, OFFSET = Linear.UNCHANGED
 class Row:
     """All inputs and outputs of a system side by side, as doubles.
 
-    Ports of a component with the same causality and type are neighbours, in the order of its
-    description, so that one FMI call moves all of them.
+    Ports of a component with the same causality and type are neighbours, so that one FMI call moves
+    all of them; a table has them as declared.
 
-    Outputs of some components have a hidden place after all columns, into which their instance
-    writes; they are shown once they are copied into their columns.
+    Outputs of some components have a hidden place after all others, into which their instance
+    writes; they are shown once they are copied into their own places.
 
     Attributes:
         values: of all ports, then the hidden ones.
-        shown: a view of the columns only.
-        columns: index of each port's value.
+        shown: a view of those that are not hidden.
+        columns: index of each port's value, in the order of the columns of a table.
         strings: texts and integers that numbers in the row stand for.
         standing: decoding of each port whose numbers may stand for other values.
 
@@ -55,14 +57,11 @@ class Row:
             hidden: components whose outputs are hidden at first.
 
         """
-        groups = [*system.columns()]
-        n = sum(len(ports) for *_, ports in groups)
-        more = sum(
-            len(ports) for name, causality, _, ports in groups if _hides(name, causality, hidden)
-        )
+        self.columns = dict.fromkeys(system.columns(), 0)
+        n = len(self.columns)
+        more = sum(len(system.components[name].having("output")) for name in hidden)
         self.values = np.zeros(n + more)
         self.shown = self.values[:n]
-        self.columns: dict[PortName, int] = {}
         self.strings = StringTable()
         self.standing: dict[PortName, Standing] = {}
         self._hidden: dict[PortName, int] = {}
@@ -72,18 +71,18 @@ class Row:
         self._inputs: dict[str, list[int]] = {}
         firsts: dict[str, int] = {}
         parts: dict[str, list[Part]] = {name: [] for name in instances}
-        for component, causality, fmi_type, ports in groups:
-            column = len(self.columns)
-            where = column
-            if _hides(component, causality, hidden):
+        end = 0
+        for component, causality, fmi_type, ports in _moved(system):
+            where = end
+            if causality == "output" and component in hidden:
                 where = n + len(self._hidden)
                 for i, port in enumerate(ports, start=where):
                     self._hidden[PortName(component, port.name)] = i
-            first = where - firsts.setdefault(component, column)
+            first = where - firsts.setdefault(component, end)
             references = references_of(ports)
             place = slice(first, first + len(ports))
             parts[component].append(Part(causality, fmi_type, references, place))
-            for i, port in enumerate(ports, start=column):
+            for i, port in enumerate(ports, start=end):
                 name = PortName(component, port.name)
                 self.columns[name] = i
                 self._ports[component].append((name, causality, fmi_type))
@@ -92,9 +91,13 @@ class Row:
                 if TYPES[fmi_type].stands:
                     self.standing[name] = Standing(fmi_type, self.strings)
                 self.values[i] = self.number(system.components[component].starts.get(port.name, 0))
+            end += len(ports)
         for component, instance in instances.items():
             part = self.values[firsts.get(component, 0) :]
             instance.tie(part, parts[component], self.strings)
+        order = np.fromiter(self.columns.values(), dtype=np.intp)
+        self._arranged = np.flatnonzero(order != np.arange(n))
+        self._taken = order[self._arranged]
         self._hiding = {name: self.hidden(self._outputs(name)) for name in hidden}
         self.enter(system.parameters)
 
@@ -120,9 +123,12 @@ class Row:
         number = float(self.values[self.columns[port]])
         return self.standing[port].value(number) if port in self.standing else number
 
-    def inputs_of(self, fmi_type: str) -> list[int]:
-        """Return the columns of the inputs of a type."""
-        return self._inputs.get(fmi_type, [])
+    def arrange(self, values: np.ndarray) -> None:
+        """Turn shown values, of one row or several, into rows of a table, in place."""
+        if rounded := self._inputs.get("Float32"):
+            values[..., rounded] = as_float32(values[..., rounded])
+        if len(self._taken):
+            values[..., self._arranged] = values[..., self._taken]
 
     def wrong(self, components: Iterable[str], passed: bool = False) -> str | None:
         """Describe the first value that is not finite or does not fit an input's type.
@@ -200,8 +206,12 @@ class Row:
             self.values[targets] = self.values[sources]
 
 
-def _hides(component: str, causality: str, hidden: Collection[str]) -> bool:
-    return causality == "output" and component in hidden
+def _moved(system: System) -> Iterator[tuple[str, str, str, list[Variable]]]:
+    """Yield the ports that one FMI call moves, with their component, causality and type."""
+    for name, component in system.components.items():
+        for causality in ("input", "output"):
+            for fmi_type, ports in component.by_type(causality).items():
+                yield name, causality, fmi_type, ports
 
 
 class Gathering:

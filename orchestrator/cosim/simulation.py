@@ -23,7 +23,7 @@ from orchestrator.cosim.observers import Blocks, Ending, Header, NotKept, Observ
 from orchestrator.cosim.plan import Plan
 from orchestrator.cosim.row import Overrides, Row
 from orchestrator.cosim.system import System
-from orchestrator.cosim.variables import Value, as_float32, same
+from orchestrator.cosim.variables import Value, same
 from orchestrator.machine.errors import InputError, StartError, reason, unforeseen
 from orchestrator.machine.interrupts import Interrupts, held_interrupts
 from orchestrator.machine.texts import literal
@@ -251,7 +251,7 @@ class Session:
             for observer in self._observers:
                 observer.begin(self.header)
                 self._begun.append(observer)
-        blocks = Blocks(len(row.shown), self._observers, self._calls.ours, row.inputs_of("Float32"))
+        blocks = Blocks(len(row.shown), self._observers, self._calls.ours, row.arrange)
         if passing is None:
             blocks.append(experiment.start_time, row.shown)
         overrides = Overrides(row, gatherings, system.connections)
@@ -359,8 +359,7 @@ class Session:
                     self._present = run.row.shown.copy()
             except ComponentFailed as error:
                 self.failure = self.failure or f"stopped at t = {run.time:.12g} s: {error}"
-            rounded = run.row.inputs_of("Float32")
-            self._present[rounded] = as_float32(self._present[rounded])
+            run.row.arrange(self._present)
         return self._present
 
     def override(self, target: PortName, value: Value) -> None:

@@ -24,7 +24,7 @@ latest values that feed it; and when all components have been stepped, so that e
 solution.
 
 A component may span n communication steps in one step. It is stepped at every n-th t_k, with the
-inputs of that time. Its results wait in hidden columns of the row until their time. Outputs with
+inputs of that time. Its results wait in hidden places of the row until their time. Outputs with
 direct feedthrough hold from t_k on: they are shown when they pass, or as soon as the component was
 stepped, unless the order is `jacobi`.
 """
@@ -56,7 +56,6 @@ from orchestrator.cosim.fmi.surroundings import PRODUCT, A, B, C, restore_mode
 from orchestrator.cosim.ring import Ring
 from orchestrator.cosim.row import Gathering, Row
 from orchestrator.cosim.system import System
-from orchestrator.cosim.variables import TYPES
 from orchestrator.machine.errors import shortened
 
 #: A stage by names or as calls.
@@ -561,10 +560,8 @@ def _reading(visit: Visit, instance: Instance, component: Component) -> list[Cal
     # The answer of another process must be taken in any case.
     if visit.reads == ALL or not instance.is_here:
         return instance.get_outputs
-    outputs = component.having("output")
-    types = [fmi_type for fmi_type in TYPES if any(output.type == fmi_type for output in outputs)]
-    read_types = visit.types_read(component, (output.name for output in outputs))
-    calls = zip(instance.get_outputs, types, strict=True)
+    read_types = visit.types_read(component, (port.name for port in component.having("output")))
+    calls = zip(instance.get_outputs, component.by_type("output"), strict=True)
     return [call for call, fmi_type in calls if fmi_type in read_types]
 
 

@@ -473,17 +473,17 @@ class System:
         """
         return self.component(port.component).variable(port.port)
 
-    def columns(self) -> Iterator[tuple[str, str, str, list[Variable]]]:
-        """Yield the columns of a row: neighbours have the same component, causality and type.
+    def columns(self, causalities: Sequence[str] = ("input", "output")) -> Iterator[PortName]:
+        """Yield a table's columns: of each component the inputs, then the outputs, as declared.
 
-        Yields:
-            The component, the causality, the type, and the ports, in the order of the description.
+        Args:
+            causalities: of the ports.
 
         """
         for name, component in self.components.items():
-            for causality in ("input", "output"):
-                for fmi_type, ports in component.by_type(causality).items():
-                    yield name, causality, fmi_type, ports
+            for causality in causalities:
+                for variable in component.having(causality):
+                    yield PortName(name, variable.name)
 
     def units(self, ports: Iterable[PortName]) -> dict[str, str]:
         """Return the units of the ports that have one."""

@@ -67,7 +67,7 @@ def _integer(c_type: Any, family: str = "Integer") -> Type:
     return Type(family, c_type, int(info.min), int(info.max))
 
 
-#: Types that can be connected, set and recorded, in the order of their columns.
+#: Types that can be connected, set and recorded, in the order in which calls move their values.
 TYPES = {
     "Real": _real(ctypes.c_double),
     "Float64": _real(ctypes.c_double),

@@ -114,7 +114,9 @@ class _Turned:
                 outputs = [variable.name for variable in component.having("output")]
                 held = run.instances[name].read(outputs)
                 row.enter({PortName(name, port): value for port, value in held.items()})
-        self._observer.take(np.array([[run.time, *row.shown]]))
+        shown = row.shown.copy()
+        row.arrange(shown)
+        self._observer.take(np.array([[run.time, *shown]]))
         row.values[:] = before
         return run.made + 1
 

@@ -644,13 +644,11 @@ class Text:
         for name in self.components:
             places |= self._inputs(name)
             places |= self._outputs(name, "_shown" if name in self.slow else ".outputs")
-        if not self.is_stepped:
-            return places
-        # The columns of a run of FMUs, each of which has an output for faults.
+        # FMUs have an output for faults, too.
         return {
             port: places.get(port, _NO_FAULT)
-            for name, _, _, ports in self.plan.system.columns()
-            for port in (PortName(name, variable.name) for variable in ports)
+            for port in self.plan.system.columns()
+            if self.is_stepped or port in places
         }
 
     @cached_property

@@ -434,7 +434,7 @@ def selected_columns(system: System, choice: str, is_companion: bool = False) ->
         return None
     if choice == "outputs":
         return outputs_of(system)
-    names = _columns(system, "input", "output")
+    names = [*map(str, system.columns())]
     patterns = [pattern.strip() for pattern in choice.split(",") if pattern.strip()]
     if not patterns:
         raise InputError("--columns: name columns, or write all or outputs")
@@ -449,16 +449,7 @@ def selected_columns(system: System, choice: str, is_companion: bool = False) ->
 
 def outputs_of(system: System) -> list[str]:
     """Return the columns of all outputs."""
-    return _columns(system, "output")
-
-
-def _columns(system: System, *causalities: str) -> list[str]:
-    return [
-        f"{component.name}.{variable.name}"
-        for component in system.components.values()
-        for causality in causalities
-        for variable in component.having(causality)
-    ]
+    return [*map(str, system.columns(["output"]))]
 
 
 # Checkpoints

@@ -18,10 +18,20 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from orchestrator import Result, read, simulate
+from orchestrator import Result, Simulation, read, simulate
 from orchestrator.commands.main import main
-from orchestrator.cosim import Connection, Linear, Mapped, PortName, Value, read_ssp, write_ssp
-from orchestrator.exchange.verify import verify
+from orchestrator.cosim import (
+    Connection,
+    Experiment,
+    Linear,
+    Mapped,
+    PortName,
+    Table,
+    Value,
+    read_ssp,
+    write_ssp,
+)
+from orchestrator.exchange.verify import verify, ways
 from orchestrator.figures.visible import VisibleRows
 from orchestrator.machine.errors import InputError
 from support import typed
@@ -170,7 +180,7 @@ def test_a_run_with_infinite_parameters_is_read_and_drawn(fmu: Path, tmp_path: P
             result.plot("a.y_String")
     for result in (made, stored):
         axes = result.plot("a.y_*nt64", "a.counter").axes
-        assert [axis.get_ylabel() for axis in axes] == ["a.y_Int64", "a.counter", "a.y_UInt64"]
+        assert [axis.get_ylabel() for axis in axes] == ["a.counter", "a.y_Int64", "a.y_UInt64"]
     arguments = ["plot", str(folder), "a.u_*n*", "--out", str(tmp_path / "plot.png")]
     assert main(arguments) == 0
     # Earlier versions wrote invalid JSON.
@@ -274,3 +284,22 @@ def test_large_integers_are_verified_in_blocks_of_any_size(fmu: Path, tmp_path: 
     table = simulate(system, stop_time=4 * H).save(tmp_path) / "result.csv"
     with patch("orchestrator.cosim.observers._ROWS", rows):
         verify(table, system, 0.0)
+
+
+def test_outputs_read_on_the_other_side_of_the_exchange_are_in_their_columns(fmu: Path):
+    """Constant inputs: their copies are the same on both sides."""
+    system = typed.system_of(fmu, parameters={f"a.u_{k}": v for k, v in typed.VALUES.items()})
+    table, [way] = Table(), ways(system, "jacobi", "full")
+    way.turn().run(system, Experiment(4 * H, H), table)
+    for kind, value in typed.VALUES.items():
+        assert table[f"a.y_{kind}"].tolist() == [value] * len(table), kind
+    assert len(table) > 3
+
+
+@pytest.mark.parametrize("loop", LOOPS)
+def test_a_simulation_reads_every_column(fmu: Path, loop: str):
+    values = {f"a.u_{kind}": value for kind, value in typed.VALUES.items()}
+    with Simulation(typed.system_of(fmu, parameters=values), step=H, loop=loop) as sim:
+        sim.step()
+        for kind, value in typed.VALUES.items():
+            assert sim[f"a.u_{kind}"] == sim[f"a.y_{kind}"] == value, kind

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ import pytest
 from orchestrator import simulate
 from orchestrator.commands.main import main
 from orchestrator.machine.user_files import unpack
+from orchestrator.runs.preparation import load_scenario
 from orchestrator.runs.tables import read_columns, read_rows
 from support.others import build, system_of
 from support.texts import mentions
@@ -42,6 +44,22 @@ def test_interval_and_columns_choose_from_the_same_numbers():
     assert main(["run", "fig4", *outputs]) == 0
     names = read_columns(Path("outputs/result.csv"))
     assert "plant.y.x" in names and "plant.tau.u" not in names
+
+
+def test_columns_are_in_the_order_of_the_descriptions(native: Path):
+    """NavigationFilter has Booleans between numbers."""
+    command = "run navigation-pd-true --kind native --stop-time 0.1 --no-figures --out mixed"
+    assert main(command.split()) == 0
+    _, system = load_scenario("navigation-pd-true", "native")
+    assert read_columns(Path("mixed/result.csv")) == tuple(
+        f"{name}.{variable.get('name')}"
+        for name, component in system.components.items()
+        for causality in ("input", "output")
+        for variable in ElementTree.parse(component.folder / "modelDescription.xml").iter(
+            "ScalarVariable"
+        )
+        if variable.get("causality") == causality
+    )
 
 
 def test_parquet_holds_the_same_numbers():

@@ -43,7 +43,7 @@ def made(system: System, hidden: str = "") -> tuple[Row, dict[str, Tied]]:
 
 def test_ports_of_one_causality_and_type_are_neighbours(system: System):
     row, instances = made(system)
-    assert [str(port) for port in row.columns] == [
+    assert [str(port) for port in sorted(row.columns, key=row.columns.__getitem__)] == [
         f"{component}.{port}" for component in "ab" for port in ("u", "v", "n", "s", "y")
     ]
     for k, name in enumerate("ab"):
@@ -55,6 +55,17 @@ def test_ports_of_one_causality_and_type_are_neighbours(system: System):
         # The part is a view: an instance writes into the row.
         instances[name].values[4] = 7.0 + k
     assert [row.values[row.columns[PortName(name, "y")]] for name in "ab"] == [7.0, 8.0]
+
+
+def test_a_table_has_ports_as_declared(system: System):
+    row, _ = made(system)
+    names = [f"{component}.{port}" for component in "ab" for port in ("u", "n", "s", "v", "y")]
+    assert [*map(str, row.columns)] == names
+    for i, name in enumerate(names):
+        row.values[row.columns[PortName.read(name)]] = i
+    rows = np.vstack([row.shown, row.shown + 10.0])
+    row.arrange(rows)
+    np.testing.assert_array_equal(rows, [np.arange(10.0), np.arange(10.0, 20.0)])
 
 
 def test_inputs_start_with_values_of_the_description_or_the_system(system: System):
