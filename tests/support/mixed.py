@@ -44,8 +44,9 @@ class Shape(NamedTuple):
         # Integers and Enumerations share their references, as FMI's functions do.
         return [
             (f"{causality}.{kind}{i}", kind, first + (kind == "Enumeration") * _MOST + i)
+            for i in range(_MOST)
             for kind, n in zip(KINDS, counts, strict=True)
-            for i in range(n)
+            if i < n
         ]
 
     def description(self) -> str:

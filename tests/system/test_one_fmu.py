@@ -31,7 +31,7 @@ from support.tiers import slow
 #: Communication step of the scenarios [s], and how many steps are compared.
 H, STEPS = 0.02, 120
 
-SCENARIOS = ("fig4", "sea", *slow("formation-v", "remus", "bluerov"))
+SCENARIOS = ("fig4", "sea", *slow("formation-v", "navigation", "remus", "bluerov"))
 
 #: Values for an input that is open in all of these.
 WAVE = "time,plant.water.x\n" + "".join(f"{H * k!r},{0.3 * sin(k)!r}\n" for k in range(STEPS))
@@ -76,8 +76,9 @@ def outputs(path: Path) -> list[str]:
 
 
 def check(found: Any, result: Result, names: list[str]) -> None:
-    """Compare columns with a run, bit for bit."""
+    """Compare outputs with the columns of a run, in their order, bit for bit."""
     assert len(names) > 50
+    assert [name for name in result.columns if name in {*names}] == names
     assert len(result) == STEPS + 1
     for name in names:
         assert np.array_equal(np.asarray(found[name], dtype=float), result[name]), name
