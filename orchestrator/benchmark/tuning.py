@@ -18,7 +18,6 @@ import numpy as np
 
 from fmus.discovery import digest_at
 from fmus.kinds import PYTHON
-from orchestrator.benchmark import cost
 from orchestrator.benchmark.contest import (
     Law,
     Vehicle,
@@ -115,8 +114,9 @@ def _found(law: Law, vehicle: Vehicle, budget: Budget, own: np.ndarray, means: M
 
 def digest(law: Law, vehicle: Vehicle, budget: Budget) -> str:
     """Return a hash of the law, the vehicle, the budget and the files of the benchmark."""
-    files = sorted(Path(__file__).parent.glob("components/*.py"))
-    own = [digest_at(file) for file in (*files, Path(cost.__file__))]
+    here = Path(__file__).parent
+    files = *sorted(here.glob("components/*.py")), here / "cost.py", here / "score.py"
+    own = [digest_at(file) for file in files]
     content = (law.digest, {**law.gains}, vehicle.scenario.digest, vehicle.study.sample)
     return sha256(repr((content, vehicle.known, budget, own)).encode()).hexdigest()[:16]
 

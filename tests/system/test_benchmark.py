@@ -131,7 +131,7 @@ def test_numbers_of_a_run_follow_from_its_rows():
         "error": np.sqrt((late**2).mean()),
         "largest": late.max(),
         "effort": np.sqrt((limited**2).mean()),
-        "saturated": (np.abs(tau) > 1.0).any(axis=1).mean(),
+        "saturated": (np.abs(tau) > 1.0 - 1e-9).any(axis=1).mean(),
         "chatter": np.abs(np.diff(limited, axis=0)).sum() / 3.0 / 2.0,
     }
     found = {name: outcome.indices[name] for name in expected}
