@@ -12,6 +12,9 @@ from auv_fmu.paper.control_point import control_point
 
 XYZ, ANGLES, TAU = ("x", "y", "z"), ("phi", "theta", "psi"), {"u": "N", "q": "N.m", "r": "N.m"}
 
+#: A command is at its limit from this share on: a law that limits its force rounds.
+FULL = 1.0 - 1e-9
+
 
 class Inputs(NamedTuple):
     """Posture, reference, command and limits."""
@@ -31,7 +34,7 @@ class State(NamedTuple):
     rows: int  #: in the second half
     largest: float  #: error in the second half [m]
     energy: float  #: mean square of the limited commands, times the number of steps
-    saturated: int  #: steps with a command beyond its limit
+    saturated: int  #: steps with a command at its limit or beyond
     variation: float  #: total variation of the limited commands
     shares: Annotated[Vector, 3]  #: limited commands of the last step
     steps: int
@@ -45,7 +48,7 @@ class Outputs(NamedTuple):
     effort: Annotated[
         float, Variable("1", "root mean square of the limited commands, as shares of the limits")
     ]
-    saturated: Annotated[float, Variable("1", "share of the steps with a command beyond a limit")]
+    saturated: Annotated[float, Variable("1", "share of the steps with a command at a limit")]
     chatter: Annotated[
         float,
         Variable("1/s", "total variation of the limited commands per second, mean of the three"),
@@ -71,7 +74,7 @@ def update(
         squares, rows, largest = squares + error * error, rows + 1, max(largest, error)
     wanted = Vector(acting.tau[i] / acting.tau_max[i] for i in range(3))
     shares = Vector(max(-1.0, min(1.0, share)) for share in wanted)
-    beyond = any(abs(share) > 1.0 for share in wanted)
+    full = any(abs(share) >= FULL for share in shares)
     change = abs(shares[0] - state.shares[0])
     change = change + abs(shares[1] - state.shares[1])
     change = change + abs(shares[2] - state.shares[2])
@@ -80,7 +83,7 @@ def update(
         rows,
         largest,
         state.energy + (shares @ shares) / 3.0,
-        state.saturated + (1 if beyond else 0),
+        state.saturated + (1 if full else 0),
         state.variation + (change / 3.0 if state.steps > 0 else 0.0),
         shares,
         state.steps + 1,

@@ -1,9 +1,9 @@
 """The search for gains, the same for all laws.
 
-Candidates are drawn in rounds, each by a Latin hypercube in the logarithms of the gains. The first
-round searches the whole ranges, and includes the law's own values. Each later round searches a box
-around the best candidate so far, half as wide as in the round before. A candidate costs the
-mean of its runs: all tasks, with draws that the benchmark does not use.
+Differential evolution searches the logarithms of the gains: Storn and Price, Journal of Global
+Optimization 11 (1997). The first round is a Latin hypercube over the ranges, and includes the
+law's own values. A candidate costs the mean of its runs: all tasks, with draws that the benchmark
+does not use. At the end the best candidates compete with the law's own values on other draws.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ import numpy as np
 
 from fmus.discovery import digest_at
 from fmus.kinds import PYTHON
-from orchestrator.benchmark import cost
 from orchestrator.benchmark.contest import (
     Law,
     Vehicle,
@@ -41,14 +40,22 @@ class Budget(NamedTuple):
         rounds: of candidates.
         candidates: in each round.
         draws: for each task and candidate.
-        seed: of the candidates; that of the draws follows from the benchmark's.
+        finalists: candidates that compete at the end.
+        final_draws: for each task and finalist.
+        seed: of the candidates; those of the draws follow from the benchmark's.
 
     """
 
-    rounds: int = 5
+    rounds: int = 12
     candidates: int = 32
-    draws: int = 16
+    draws: int = 8
+    finalists: int = 7
+    final_draws: int = 64
     seed: int = 1
+
+
+#: The fewest candidates: each new one is made of four others.
+FEWEST = 5
 
 
 def search(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> dict[str, Any]:
@@ -61,53 +68,68 @@ def search(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> dict[str
         InputError: the runs cannot be made.
 
     """
-    from scipy.stats import qmc  # noqa: PLC0415
-
-    ready = _prepared(law, vehicle, budget, means)
-    names = [*law.gains]
-    low, high = (np.log([limits[i] for limits in law.gains.values()]) for i in (0, 1))
-    own = _own(law, ready)
-    generator = np.random.default_rng(budget.seed)
-    best, least, first = own, np.inf, np.nan
-    for number in range(budget.rounds if names else 1):
-        half = 0.5 ** (number + 1) * (high - low)
-        middle = np.clip(best, low + half, high - half) if number else 0.5 * (low + high)
-        shares = qmc.LatinHypercube(max(len(names), 1), rng=generator).random(budget.candidates)
-        some = middle + (2.0 * shares[:, : len(names)] - 1.0) * half
-        if number == 0:
-            some[0] = own
-            some = some if names else some[:1]
-        found = _costs(law, ready, np.exp(some), means)
-        first = found[0] if number == 0 else first
-        if found.min() < least:
-            best, least = some[found.argmin()], float(found.min())
+    final = _prepared(law, vehicle, budget.final_draws, 2, means)
+    own = _own(law, final)
+    some = np.array([own, *_found(law, vehicle, budget, own, means)])
+    found = _costs(law, final, np.exp(some), means)
+    best = found.argmin()
     return {
         "digest": digest(law, vehicle, budget),
-        "cost": round(least, 6),
-        "cost_of_own": round(float(first), 6),
+        "cost": round(float(found[best]), 6),
+        "cost_of_own": round(float(found[0]), 6),
         "gains": {
             name: float(f"{value:.4g}")
-            for name, value in zip(names, np.exp(best).tolist(), strict=True)
+            for name, value in zip(law.gains, np.exp(some[best]).tolist(), strict=True)
         },
     }
 
 
+def _found(law: Law, vehicle: Vehicle, budget: Budget, own: np.ndarray, means: Means) -> np.ndarray:
+    """Return the finalists, the best first: logarithms of gains (finalists, names)."""
+    if not law.gains:
+        return np.empty((0, 0))
+    from scipy.optimize import differential_evolution  # noqa: PLC0415
+    from scipy.stats import qmc  # noqa: PLC0415
+
+    ready = _prepared(law, vehicle, budget.draws, 1, means)
+    low, high = (np.log([limits[i] for limits in law.gains.values()]) for i in (0, 1))
+    generator = np.random.default_rng(budget.seed)
+    shares = qmc.LatinHypercube(len(low), rng=generator).random(budget.candidates)
+    first = low + shares * (high - low)
+    first[0] = own
+    result = differential_evolution(
+        lambda some: _costs(law, ready, np.exp(some.T), means),
+        [*zip(low, high, strict=True)],
+        init=first,
+        maxiter=budget.rounds - 1,
+        tol=0.0,
+        polish=False,
+        vectorized=True,
+        updating="deferred",
+        rng=generator,
+    )
+    best: np.ndarray = result.population[np.argsort(result.population_energies)]
+    return best[: budget.finalists]
+
+
 def digest(law: Law, vehicle: Vehicle, budget: Budget) -> str:
     """Return a hash of the law, the vehicle, the budget and the files of the benchmark."""
-    files = sorted(Path(__file__).parent.glob("components/*.py"))
-    own = [digest_at(file) for file in (*files, Path(cost.__file__))]
+    here = Path(__file__).parent
+    files = *sorted(here.glob("components/*.py")), here / "cost.py", here / "score.py"
+    own = [digest_at(file) for file in files]
     content = (law.digest, {**law.gains}, vehicle.scenario.digest, vehicle.study.sample)
     return sha256(repr((content, vehicle.known, budget, own)).encode()).hexdigest()[:16]
 
 
-def training(study: Study) -> Study:
+def training(study: Study, number: int) -> Study:
     """Return a study with other draws."""
     assert study.sample is not None
-    return replace(study, sample=study.sample._replace(seed=study.sample.seed + 1))
+    return replace(study, sample=study.sample._replace(seed=study.sample.seed + number))
 
 
-def _prepared(law: Law, vehicle: Vehicle, budget: Budget, means: Means) -> Ready:
-    study = training(study_of_law(law, vehicle, budget.draws))
+def _prepared(law: Law, vehicle: Vehicle, draws: int, number: int, means: Means) -> Ready:
+    """Return a law with a vehicle, ready for runs with these draws."""
+    study = training(study_of_law(law, vehicle, draws), number)
     systems = {study.name: loop_of(law, vehicle, {})}
     with clear_refusals(law):
         return prepare_study(study, replace(means, kind=PYTHON), given=systems)

@@ -20,7 +20,7 @@ from orchestrator.benchmark.contest import (
     vehicles,
 )
 from orchestrator.benchmark.table import ALL, Made, as_csv, as_text, cells, page, runs_in
-from orchestrator.benchmark.tuning import Budget, digest, search, written
+from orchestrator.benchmark.tuning import FEWEST, Budget, digest, search, written
 from orchestrator.commands.options import add_options, add_out, from_options
 from orchestrator.commands.streams import INTERRUPTED, OK, describe, say, show
 from orchestrator.figures.style import FIGURE_FORMATS
@@ -38,7 +38,7 @@ class Choice:
     """Options of the benchmark.
 
     Raises:
-        InputError: a number is below 1.
+        InputError: a number is too small.
 
     """
 
@@ -64,13 +64,13 @@ class Choice:
     force: bool = option(False, FORCE)
 
     def __post_init__(self) -> None:
-        for name, n in (
-            ("runs", self.runs),
-            ("candidates", self.candidates),
-            ("workers", self.workers),
+        for name, n, least in (
+            ("runs", self.runs, 1),
+            ("candidates", self.candidates, FEWEST),
+            ("workers", self.workers, 1),
         ):
-            if n is not None and n < 1:
-                raise InputError(f"--{name} {n}: must be at least 1")
+            if n is not None and n < least:
+                raise InputError(f"--{name} {n}: must be at least {least}")
 
 
 def add_benchmark(parser: argparse.ArgumentParser) -> None:

@@ -131,7 +131,7 @@ def test_numbers_of_a_run_follow_from_its_rows():
         "error": np.sqrt((late**2).mean()),
         "largest": late.max(),
         "effort": np.sqrt((limited**2).mean()),
-        "saturated": (np.abs(tau) > 1.0).any(axis=1).mean(),
+        "saturated": (np.abs(tau) > 1.0 - 1e-9).any(axis=1).mean(),
         "chatter": np.abs(np.diff(limited, axis=0)).sum() / 3.0 / 2.0,
     }
     found = {name: outcome.indices[name] for name in expected}
@@ -148,7 +148,8 @@ def test_all_laws_have_the_same_draws_and_the_search_has_others():
     seeds = first["sensors.noise.seed"].reshape(6, 3)
     assert (seeds == seeds[0]).all() and len({*seeds[0]}) == 3
     study = study_of_law(laws()["pd"], vehicles()["remus"], 3)
-    assert training(study).sample != study.sample
+    seeds = {training(study, number).sample.seed for number in range(3)}  # type: ignore[union-attr]
+    assert len(seeds) == 3
 
 
 def test_the_vehicle_sets_what_a_law_knows_of_it():
@@ -276,8 +277,8 @@ def test_costs_and_ranks():
 
 
 def test_search_is_the_same_for_a_seed():
-    law, vehicle = laws()["pid"], vehicles()["auv"]
-    budget = Budget(2, 3, 1, 5)
+    law, vehicle = laws()["learned"], vehicles()["auv"]
+    budget = Budget(3, 8, 1, 2, 1)
     first = search(law, vehicle, budget, Means())
     assert search(law, vehicle, budget, Means()) == first
     assert search(law, vehicle, budget._replace(seed=6), Means())["gains"] != first["gains"]
@@ -285,6 +286,19 @@ def test_search_is_the_same_for_a_seed():
     for name, value in first["gains"].items():
         low, high, _ = law.gains[name]
         assert 0.999 * low <= value <= 1.001 * high
+
+
+def test_search_finds_a_minimum_that_is_known(monkeypatch):
+    law, vehicle = laws()["pid"], vehicles()["auv"]
+    known = {"omega": 3.0, "zeta": 0.7, "T_i": 40.0, "T_f": 0.05}
+
+    def bowl(law, ready, gains: np.ndarray, means) -> np.ndarray:
+        return (np.log(gains / [*known.values()]) ** 2).sum(axis=1)
+
+    monkeypatch.setattr(tuning, "_costs", bowl)
+    found = search(law, vehicle, Budget(rounds=40, draws=1, final_draws=1), Means())
+    for name, value in found["gains"].items():
+        assert value == pytest.approx(known[name], rel=0.02)
 
 
 def test_gains_of_the_program_are_within_the_ranges_of_its_laws():
@@ -350,7 +364,7 @@ def test_a_law_of_the_users_own_enters_the_table(mine: Path, capsys, monkeypatch
 
 @pytest.mark.slow
 def test_its_gains_are_searched_once(mine: Path, capsys):
-    search = [*COMMAND, "--tune", "--candidates", "2"]
+    search = [*COMMAND, "--tune", "--candidates", "5"]
     assert main(search) == 0
     assert "searching" in capsys.readouterr().err
     gains = contest.read_gains(mine.parent / "results" / "benchmark" / "gains.toml")
