@@ -35,6 +35,7 @@ PLAIN = "plain"
 #: The component that stands for the others of each kind: all share what answers. The second one is
 #: tried where the first has no such port.
 COMPONENTS = {PYTHON: REPRESENTATIVES, NATIVE: REPRESENTATIVES[::-1], FMI3: REPRESENTATIVES}
+OTHERS = [name for name in NAMES if name not in REPRESENTATIVES]
 
 WITHOUT_STATES = [
     *((CREATION, case) for case in creations()),
@@ -51,6 +52,9 @@ KEYS = {
     ],
 }
 
+#: The creation that a component without rates refuses.
+OF_RATES = (CREATION, "the type fmi2ModelExchange")
+
 #: Functions that PythonFMU's own library answers in part, without a guard.
 UNGUARDED = (
     "fmi2FreeFMUstate",
@@ -62,6 +66,11 @@ UNGUARDED = (
 
 #: Tries a row on an FMU of a kind and gives the mistakes.
 Try = Callable[[str, str, Key, Sequence[str]], dict[str, str]]
+
+
+def with_port(key: Key, names: Sequence[str]) -> list[str]:
+    """The components with the port that a row needs."""
+    return [name for name in names if key not in rows() or has_call(name, key)]
 
 
 def states_of(key: Key) -> list[str]:
@@ -104,10 +113,23 @@ def tried(
 )
 def test_row(tried: Try, kind: str, key: Key):
     names = (*COMPONENTS[kind], *NAMES)
-    if key == (CREATION, "the type fmi2ModelExchange"):
-        # A component without rates.
+    if key == OF_RATES:
         names = REPRESENTATIVES[1:]
-    name = next(name for name in names if key not in rows() or has_call(name, key))
+    assert tried(kind, with_port(key, names)[0], key, states_of(key)) == {}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "key", "turn"),
+    [
+        pytest.param(kind, key, turn % len(OTHERS), id=f"{kind}-{key}")
+        for kind in KEYS
+        for turn, key in enumerate(KEYS[kind])
+        if key != OF_RATES
+    ],
+)
+def test_row_of_the_others_in_turn(tried: Try, kind: str, key: Key, turn: int):
+    name = with_port(key, OTHERS[turn:] + OTHERS[:turn])[0]
     assert tried(kind, name, key, states_of(key)) == {}
 
 
