@@ -12,7 +12,14 @@ from auv_fmu.paper import plant
 from auv_fmu.paper.euler import STEP
 from auv_fmu.remus import remus100
 from auv_fmu.remus.remus100 import Parameters, RemusState
-from auv_fmu.remus.tail import ACTUATOR, __citation__, limit_tail, margins
+from auv_fmu.remus.tail import (
+    ACTUATOR,
+    FASTEST,
+    FASTEST_TURN,
+    __citation__,
+    limit_tail,
+    margins,
+)
 
 H_MAX = STEP
 
@@ -161,4 +168,4 @@ def check_state(parameters: Parameters, state: RemusState) -> None:
     delta_max, n_max = parameters.tail.delta_max, parameters.tail.n_max
     if not (abs(delta_r) <= delta_max and abs(delta_s) <= delta_max and abs(n) <= n_max):
         raise Refusal("its fins or its propeller are beyond their limits")
-    remus100.check_speed(state)
+    plant.check_speed(remus100.through_water(state), FASTEST, FASTEST_TURN)

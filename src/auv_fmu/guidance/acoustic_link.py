@@ -19,7 +19,7 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.random_numbers import MESSAGE_LOSSES, start, uniform
-from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.language.variable import POSITIVE, Refusal, Variable
 from auv_fmu.language.vectors import Vector3, distance
 
 #: Shortest period [s], which no modem reaches.
@@ -37,10 +37,6 @@ _ROUNDING = 1e-6
 #: Numbers in a place of the queue, and an empty place. The last number of an occupied one is 1.
 _NUMBERS = 9
 _EMPTY = Vector((0.0,) * _NUMBERS)
-
-
-class BadLink(ArithmeticError):
-    """Parameters that no link can have, or a step that is too long."""
 
 
 class Parameters(NamedTuple):
@@ -84,12 +80,12 @@ def check(parameters: Parameters) -> None:
     """Refuse a link with more messages under way than :data:`PLACES`.
 
     Raises:
-        BadLink: the latency is too long for the period.
+        Refusal: the latency is too long for the period.
 
     """
     period, latency = parameters.period, parameters.latency
     if latency > PLACES * period:
-        raise BadLink(
+        raise Refusal(
             f"a latency of {latency:g} s with a message every {period:g} s: more than {PLACES:d} "
             f"would be under way; raise period or reduce latency"
         )
@@ -146,13 +142,13 @@ def advance(
         h: step [s].
 
     Raises:
-        BadLink: the step has too many messages.
+        Refusal: the step has too many messages.
 
     """
     before, end = t + h - _ROUNDING * h, t + h + _ROUNDING * h
     due = (before - next_time(parameters, state)) / parameters.period
     if not due <= MOST_IN_A_STEP:
-        raise BadLink(
+        raise Refusal(
             f"a step of {h:g} s has more than {MOST_IN_A_STEP:d} messages; raise period or take "
             f"shorter steps"
         )

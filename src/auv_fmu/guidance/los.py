@@ -35,10 +35,9 @@ from enum import IntEnum
 from math import atan, atan2, cos, degrees, exp, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.guidance.follower import ImpossiblePath
 from auv_fmu.guidance.path_planner import Count, Down, East, North
 from auv_fmu.language.quantities import POSITION
-from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.language.variable import POSITIVE, Refusal, Variable
 from auv_fmu.language.vectors import Vector3, add_scaled, distance
 from auv_fmu.paper.actuators import limit
 from auv_fmu.paper.motion_planner import STEEPEST
@@ -203,18 +202,18 @@ def check(path: Path, radius: float) -> None:
     """Refuse waypoints between which there is no guidance.
 
     Raises:
-        ImpossiblePath: a leg is too short or too steep.
+        Refusal: a leg is too short or too steep.
 
     """
     for k in range(1, path.n):
         line = leg(path, k)
         if not radius < line.length:
-            raise ImpossiblePath(
+            raise Refusal(
                 f"waypoints {k:d} and {k + 1:d} are {line.length:g} m apart, which must be more "
                 f"than radius = {radius:g} m"
             )
         if abs(line.elevation) > STEEPEST:
-            raise ImpossiblePath(
+            raise Refusal(
                 f"the leg from waypoint {k:d} to {k + 1:d} climbs or dives at "
                 f"{degrees(abs(line.elevation)):.1f} degrees, and the limit is "
                 f"{degrees(STEEPEST):g}"

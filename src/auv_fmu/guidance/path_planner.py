@@ -31,8 +31,8 @@ from math import atan2, degrees, sqrt, tan
 from typing import Annotated, NamedTuple
 
 from auv_fmu.guidance import follower
-from auv_fmu.guidance.follower import Follower, ImpossiblePath
-from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.guidance.follower import Follower
+from auv_fmu.language.variable import POSITIVE, Refusal, Variable
 from auv_fmu.language.vectors import (
     Vector3,
     Vector32,
@@ -279,7 +279,7 @@ def check(parameters: Parameters) -> None:
     """Refuse a path that the vehicle cannot follow, with the place.
 
     Raises:
-        ImpossiblePath: the waypoints make no path, or the path exceeds a limit.
+        Refusal: the waypoints make no path, or the path exceeds a limit.
 
     """
     waypoints = parameters.waypoints
@@ -289,7 +289,7 @@ def check(parameters: Parameters) -> None:
         _check_leg(waypoints, k)
         k = k + 1
     if norm(course(waypoints, first_corner(waypoints, 0.0), _AT_REST)) == 0.0:
-        raise ImpossiblePath("all waypoints are the same: there is no path between them")
+        raise Refusal("all waypoints are the same: there is no path between them")
     _check_pitch(waypoints)
     corner = first_corner(waypoints, 0.0)
     ahead = corner
@@ -304,17 +304,17 @@ def _check_leg(waypoints: Waypoints, k: int) -> None:
     before, behind = waypoint(waypoints, k - 1), waypoint(waypoints, k)
     x, y, z = sub(behind, before)
     if waypoints.timed and not waypoints.t[k] > waypoints.t[k - 1]:
-        raise ImpossiblePath(
+        raise Refusal(
             f"waypoint {k + 1:d} has the time {waypoints.t[k]:g} s, and the one before it "
             f"{waypoints.t[k - 1]:g} s: times must increase"
         )
     if not waypoints.timed and distance(before, behind) == 0.0:
-        raise ImpossiblePath(
+        raise Refusal(
             f"waypoints {k:d} and {k + 1:d} are the same; only waypoints with times can rest"
         )
     climb = atan2(abs(z), sqrt(x * x + y * y))
     if climb > STEEPEST:
-        raise ImpossiblePath(
+        raise Refusal(
             f"the leg from waypoint {k:d} to {k + 1:d} climbs or dives at {degrees(climb):.1f} "
             f"degrees, {degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
             f"(1) has a pole at 90"
@@ -372,14 +372,14 @@ def _check_pitch_between(
             (x, y, z), dy_d, _ = reference(waypoints, corner, t)
             climb = atan2(abs(dy_d[2]), sqrt(dy_d[0] * dy_d[0] + dy_d[1] * dy_d[1]))
             if _steepness(dy_d, dy_d, fastest) > 0.0:
-                raise ImpossiblePath(
+                raise Refusal(
                     f"near waypoint {corner.k + 1:d}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path "
                     f"climbs or dives at {degrees(climb):.1f} degrees, "
                     f"{degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
                     f"(1) has a pole at 90; insert a less steep leg"
                 )
             if share < _SHORTEST:
-                raise ImpossiblePath(
+                raise Refusal(
                     f"the path turns straight back at waypoint {corner.k + 1:d}, which no "
                     f"vehicle can follow; add a waypoint to one side"
                 )
@@ -445,7 +445,7 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
         if before[0] * dx + before[1] * dy + before[2] * dz < 0.0 or (
             not moves and norm(moment.ddy_d) > 0.0
         ):
-            raise ImpossiblePath(
+            raise Refusal(
                 f"the path turns straight back at waypoint {corner.k + 1:d}, which no vehicle "
                 f"can follow; add a waypoint to one side"
             )

@@ -19,7 +19,7 @@ from auv_fmu.language.variable import Refusal, Variable
 from auv_fmu.language.vectors import Vector3, Vector6, add, add_scaled
 from auv_fmu.paper.attitude import rotate, rotation_from_euler
 from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
-from auv_fmu.paper.plant import Localisation
+from auv_fmu.paper.plant import Localisation, check_speed
 from auv_fmu.remus import prestero
 from auv_fmu.remus.hull import (
     Drag,
@@ -44,10 +44,6 @@ class Form(IntEnum):
 
 #: Module-level name, which Python looks up faster than a member of the class.
 COEFFICIENTS = Form.COEFFICIENTS
-
-
-class TooFast(ArithmeticError):
-    """A motion through the water for which the model does not hold."""
 
 
 class Parameters(NamedTuple):
@@ -330,7 +326,7 @@ def rates(
     state = RemusState(
         state.position, state.euler, state.nu, actuator, add(parameters.current, water)
     )
-    check_speed(state)
+    check_speed(through_water(state), FASTEST, FASTEST_TURN)
     du, dv, dw, dp, dq, dr = accelerations(parameters, inertia_of(parameters), state)
     phi, theta, psi = state.euler
     u, v, w, p, q, r = state.nu
@@ -348,25 +344,6 @@ def rates(
     )
 
 
-def check_speed(state: RemusState) -> None:
-    """Refuse a motion for which the model does not hold.
-
-    Raises:
-        TooFast: it moves through the water faster than :data:`.tail.FASTEST`, or turns faster than
-            :data:`.tail.FASTEST_TURN`.
-
-    """
-    u, v, w, p, q, r = through_water(state)
-    speed = sqrt(u * u + v * v + w * w)
-    turn = sqrt(p * p + q * q + r * r)
-    if not (speed <= FASTEST and turn <= FASTEST_TURN):
-        raise TooFast(
-            f"the vehicle moves at {speed:.3g} m/s through the water and turns at {turn:.3g} "
-            f"rad/s; the model ends at {FASTEST:g} m/s and {FASTEST_TURN:g} rad/s: mend water, nu0 "
-            "or h_max"
-        )
-
-
 def begin(parameters: Parameters, water: Vector3) -> RemusState:
     """State at the start, with fins amidships and a propeller at rest.
 
@@ -378,7 +355,7 @@ def begin(parameters: Parameters, water: Vector3) -> RemusState:
     x, y, z, phi, theta, psi = parameters.eta0
     flow = add(parameters.current, water)
     state = RemusState((x, y, z), (phi, theta, psi), parameters.nu0, (0.0, 0.0, 0.0), flow)
-    check_speed(state)
+    check_speed(through_water(state), FASTEST, FASTEST_TURN)
     return state
 
 
@@ -403,10 +380,10 @@ def advance(
     """
     flow = add(parameters.current, water)
     state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
-    check_speed(state)
+    check_speed(through_water(state), FASTEST, FASTEST_TURN)
     mass = inertia_of(parameters)
     state = carried(step(parameters, mass, state, command, h), dwater, h)
-    check_speed(state)
+    check_speed(through_water(state), FASTEST, FASTEST_TURN)
     return state
 
 
