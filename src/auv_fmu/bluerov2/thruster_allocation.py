@@ -45,7 +45,7 @@ class Allocated(NamedTuple):
 
 
 class Derived(NamedTuple):
-    """What depends on parameters only."""
+    """Values that depend on parameters only."""
 
     P: Annotated[Matrix, COUNT, 6]  #: pseudo-inverse of the geometry of the thrusters
     ahead: float  #: largest thrust ahead [N]
