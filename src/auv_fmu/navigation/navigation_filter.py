@@ -539,7 +539,9 @@ def correction(P: Matrix, found: Measurement) -> Correction:
 
     """
     dx, nis = Vector((0.0,) * SIZE), 0.0
-    for k in range(found.n):
+    for k in range(MOST):
+        if k >= found.n:
+            break
         H, std = found.H[k], found.std[k]
         PH = P @ H
         variance = H @ PH + std * std
