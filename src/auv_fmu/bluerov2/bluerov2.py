@@ -204,7 +204,7 @@ def immersed(state: BlueRovState, rotation: Rotation, water: Vector3) -> BlueRov
 
     """
     nu_r = over_ground(state.nu_r, rotation, sub(state.water, water))
-    return BlueRovState(state.position, state.quaternion, nu_r, state.thrust, water)
+    return state._replace(nu_r=nu_r, water=water)
 
 
 def wanted(curve: Curve, command: Annotated[Vector, COUNT]) -> Annotated[Vector, COUNT]:

@@ -106,18 +106,6 @@ def first_state(parameters: Parameters, y: Vector3, eta: Vector3, t: float) -> L
     return LinkState(t, 0, random, queue, Message(t, y, eta), 0, 0)
 
 
-def delay(parameters: Parameters, y: Vector3, receiver: Vector3) -> float:
-    """Time that a message is under way [s].
-
-    Args:
-        parameters: of the link.
-        y: position of the sender [m].
-        receiver: position of the receiver at the time of sending [m].
-
-    """
-    return parameters.latency + distance(y, receiver) / parameters.sound_speed
-
-
 def advance(
     parameters: Parameters,
     state: LinkState,
@@ -152,11 +140,11 @@ def advance(
             f"a step of {h:g} s has more than {MOST_IN_A_STEP:d} messages; raise period or take "
             f"shorter steps"
         )
-    k = 0
+    delay, k = parameters.latency + distance(y, receiver) / parameters.sound_speed, 0
     while next_time(parameters, state) < before and k <= due:
         message = Message(next_time(parameters, state), y, eta)
         state = arrived(state, message.sent)
-        state = sent(parameters, state, message, delay(parameters, y, receiver))
+        state = sent(parameters, state, message, delay)
         k = k + 1
     return arrived(state, end)
 

@@ -247,8 +247,8 @@ def place(parameters: Parameters, t: float) -> Place:
     stages = parameters.stages
     before = offset(parameters, 0)
     d, dd, ddd = before, _NOWHERE, _NOWHERE
-    for k in range(1, MOST):
-        if k < stages.n and t > stages.t[k - 1]:
+    for k in range(1, stages.n):
+        if t > stages.t[k - 1]:
             T = stages.duration[k - 1]
             a = (t - stages.t[k - 1]) / T
             after = offset(parameters, k)
@@ -486,25 +486,24 @@ def check(parameters: Parameters) -> None:
         )
     follower.check(parameters.follower)
     most = min(limits.tau_max[0], -limits.tau_min[0])
-    for k in range(1, MOST):
-        if k < stages.n:
-            t, T = stages.t[k - 1], stages.duration[k - 1]
-            if k > 1 and t < stages.t[k - 2] + stages.duration[k - 2]:
-                raise Refusal(
-                    f"the change to stage {k + 1:d} begins at {t:g} s, before that to stage {k:d} "
-                    f"is over at {stages.t[k - 2] + stages.duration[k - 2]:g} s; start it later"
-                )
-            way = distance(offset(parameters, k), offset(parameters, k - 1))
-            speed = PEAK_SPEED * way / T
-            if speed > speed_max:
-                raise Refusal(
-                    f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
-                    f"{speed:.3g} m/s, more than speed_max, {speed_max:g}; give it at "
-                    f"least {PEAK_SPEED * way / speed_max:.3g} s"
-                )
-            force = vehicle.m11 * PEAK_ACCELERATION * way / (T * T)
-            if force > most:
-                raise Refusal(
-                    f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
-                    f"{force:.3g} N, more than the {most:g} N of (3); give it more time"
-                )
+    for k in range(1, stages.n):
+        t, T = stages.t[k - 1], stages.duration[k - 1]
+        if k > 1 and t < stages.t[k - 2] + stages.duration[k - 2]:
+            raise Refusal(
+                f"the change to stage {k + 1:d} begins at {t:g} s, before that to stage {k:d} "
+                f"is over at {stages.t[k - 2] + stages.duration[k - 2]:g} s; start it later"
+            )
+        way = distance(offset(parameters, k), offset(parameters, k - 1))
+        speed = PEAK_SPEED * way / T
+        if speed > speed_max:
+            raise Refusal(
+                f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
+                f"{speed:.3g} m/s, more than speed_max, {speed_max:g}; give it at "
+                f"least {PEAK_SPEED * way / speed_max:.3g} s"
+            )
+        force = vehicle.m11 * PEAK_ACCELERATION * way / (T * T)
+        if force > most:
+            raise Refusal(
+                f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
+                f"{force:.3g} N, more than the {most:g} N of (3); give it more time"
+            )

@@ -38,7 +38,7 @@ from typing import Annotated, NamedTuple
 from auv_fmu.guidance.path_planner import Count, Down, East, North
 from auv_fmu.language.quantities import POSITION
 from auv_fmu.language.variable import POSITIVE, Refusal, Variable
-from auv_fmu.language.vectors import Vector3, add_scaled, distance
+from auv_fmu.language.vectors import Vector3, add_scaled, distance, sub
 from auv_fmu.paper.actuators import limit
 from auv_fmu.paper.motion_planner import STEEPEST
 
@@ -145,7 +145,7 @@ def leg(path: Path, k: int) -> Leg:
     """
     before = k if k < path.n else path.n - 1
     begin, end = waypoint(path, before), waypoint(path, before + 1)
-    dx, dy, dz = end[0] - begin[0], end[1] - begin[1], end[2] - begin[2]
+    dx, dy, dz = sub(end, begin)
     azimuth = atan2(dy, dx)
     if k >= path.n:
         return Leg(end, azimuth, 0.0, 0.0)
@@ -162,8 +162,7 @@ def errors(line: Leg, place: Vector3) -> Vector3:
     """
     cos_h, sin_h = cos(line.azimuth), sin(line.azimuth)
     cos_v, sin_v = cos(line.elevation), sin(line.elevation)
-    x, y, z = line.begin
-    dx, dy, dz = place[0] - x, place[1] - y, place[2] - z
+    dx, dy, dz = sub(place, line.begin)
     ahead = dx * cos_h + dy * sin_h
     return (
         ahead * cos_v - dz * sin_v,

@@ -37,14 +37,7 @@ from math import radians, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.language.arrays import Matrix, Vector
-from auv_fmu.language.quantities import (
-    ACCELERATION,
-    ETA,
-    NU,
-    POSITION,
-    VELOCITY,
-    Members,
-)
+from auv_fmu.language.quantities import ACCELERATION, ETA, NU, POSITION, VELOCITY, Members
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import (
     Rotation,
