@@ -50,7 +50,7 @@ import numpy as np
 from scipy.optimize import root
 
 from auv_fmu.bluerov2 import bluerov2, thruster_allocation
-from auv_fmu.bluerov2.thruster_allocation import Wanted, effect, pseudo_inverse
+from auv_fmu.bluerov2.thruster_allocation import Parameters, Wanted
 from auv_fmu.loop import closed_loop
 from auv_fmu.loop.closed_loop import LongestSteps, Setting, Vehicles
 from auv_fmu.navigation.rotations import inverse, logarithm, product
@@ -959,13 +959,13 @@ def bluerov() -> None:
         shared = {key: value for key, value in changes.items() if key not in lacking}
         lines = bluerov_numbers("bluerov", changes), bluerov_numbers("bluerov-pd", shared)
         print(f"{name:41}{'  |'.join(lines)}", flush=True)
-    P = pseudo_inverse(effect(thruster_allocation.Parameters().layout))
+    derived = thruster_allocation.derive(Parameters())
     water = bluerov2.Hydrodynamics()
     wu = (4.03, 18.18), (6.22, 21.66), (5.18, 36.99)
     for k, direction in enumerate(("ahead", "aside", "down")):
         most = tuple(1e6 * (i == k) for i in range(3))
         wanted = Wanted((most[0], 0.0, 0.0), (most[1], most[2], 0.0))
-        force = thruster_allocation.evaluate(thruster_allocation.Parameters(), P, wanted)
+        force = thruster_allocation.evaluate(Parameters(), derived, wanted)
         ours = water.linear[k], water.quadratic[k]
         speeds = (steady_speed(*pair, force.tau_attained[k]) for pair in (ours, wu[k]))
         print(f"{direction}: at most {force.tau_attained[k]:.0f} N, at which the speed is "

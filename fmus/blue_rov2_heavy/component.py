@@ -148,4 +148,4 @@ def check_state(parameters: Parameters, state: BlueRovState) -> None:
     for f in state.thrust:
         if not astern <= f <= ahead:
             raise Refusal("its thrusters are beyond their limits")
-    bluerov2.check_speed(state.nu_r)
+    plant.check_speed(state.nu_r, bluerov2.FASTEST, bluerov2.FASTEST_TURN)

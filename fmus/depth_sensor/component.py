@@ -37,12 +37,8 @@ def start(parameters: DepthSensor, t: float) -> SampleState:
 
 def derive(parameters: DepthSensor, state: SampleState, inputs: Inputs, t: float) -> SampleState:
     """Return the state after what is due at time t."""
-    state = sampling.arrived(parameters.sampling, state, t)
-    if not sampling.is_due(parameters.sampling, state, t):
-        return state
-    state, error = sampling.erred(sensors.depth_errors(parameters), state, t)
-    sample = sensors.wide(inputs.z, 0.0, 0.0) + error
-    return sampling.sampled(parameters.sampling, state, sample, t)
+    errors, true = sensors.depth_errors(parameters), sensors.wide(inputs.z, 0.0, 0.0)
+    return sampling.advance(parameters.sampling, errors, state, true, t)
 
 
 def update(derived: SampleState) -> SampleState:

@@ -13,7 +13,8 @@ from auv_fmu.paper.disturbance import Disturbance, disturbance
 class Inputs(NamedTuple):
     """Velocity of the vehicle."""
 
-    nu: Annotated[Vector6, Variable(NU, "Velocity in the body frame")]
+    #: Friction depends on the velocity through the water.
+    nu: Annotated[Vector6, Variable(NU, "Velocity in the body frame", terminal="nu_r")]
 
 
 class Outputs(NamedTuple):

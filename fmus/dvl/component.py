@@ -38,12 +38,9 @@ def start(parameters: Dvl, t: float) -> SampleState:
 
 def derive(parameters: Dvl, state: SampleState, inputs: Inputs, t: float) -> SampleState:
     """Return the state after what is due at time t."""
-    state = sampling.arrived(parameters.sampling, state, t)
-    if not sampling.is_due(parameters.sampling, state, t):
-        return state
-    state, error = sampling.erred(sensors.velocity_errors(parameters), state, t)
     u, v, w = inputs.nu
-    return sampling.sampled(parameters.sampling, state, sensors.wide(u, v, w) + error, t)
+    errors, true = sensors.velocity_errors(parameters), sensors.wide(u, v, w)
+    return sampling.advance(parameters.sampling, errors, state, true, t)
 
 
 def update(derived: SampleState) -> SampleState:

@@ -33,7 +33,9 @@ _TYPES: dict[Any, tuple[str, Any]] = {
 }
 
 #: Attributes that only one causality may have.
-_ONLY = {"feedthrough": "output", "initially": "output", "tunable": "parameter"}
+_ONLY = {
+    "feedthrough": "output", "initially": "output", "tunable": "parameter", "terminal": "input",
+}  # fmt: skip
 
 #: An input, or a group of them, in `feedthrough`.
 _SOURCE = re.compile(r"[\w.,\[\]{}]+", re.ASCII)
@@ -118,6 +120,9 @@ def _said(notes: tuple[Any, ...], causality: str, place: tuple[str, ...], inner:
     for name, role in _ONLY.items():
         if getattr(variable, name) not in (None, False) and causality != role:
             raise _wrong(place, f"is no {role}, and {name} is for {role}s")
+    terminal = variable.terminal
+    if terminal is not None and not (isinstance(terminal, str) and _is_member(terminal)):
+        raise _wrong(place, f"has the terminal {terminal!r:.40}; write a name")
     if causality == "output" and (variable.minimum, variable.maximum) != (None, None):
         raise _wrong(place, "is an output; minimum and maximum are for inputs and parameters")
     for name in ("feedthrough", "initially"):
@@ -248,6 +253,7 @@ def _port(causality: str, variable: Variable, part: _Part, place: tuple[str, ...
             part.type.__name__ if choices else "",
             tuple(name.replace("{}", part.member) for name in variable.feedthrough or ()),
             tuple(name.replace("{}", part.member) for name in variable.initially or ()),
+            terminal=variable.terminal or "",
         )
         port.checked(start)
     except Misdeclared as error:

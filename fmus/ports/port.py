@@ -67,6 +67,7 @@ class Port:
             depends on everything that is set.
         array: the array that it is an element of, if any; all its elements have one unit.
         derivative: name of the continuous state that this is the rate of, if it is one.
+        terminal: name of the terminal of an input, if it is not that of its group.
 
     """
 
@@ -85,6 +86,7 @@ class Port:
     initially: tuple[str, ...] | None = ()
     array: Array | None = None
     derivative: str = ""
+    terminal: str = ""
 
     def __post_init__(self) -> None:
         """Refuse what the description of an FMU cannot express."""

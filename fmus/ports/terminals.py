@@ -1,8 +1,8 @@
 """terminalsAndIcons.xml of FMI 3.0.
 
-A terminal is a group of ports that a tool connects as one. It has the name of its group, or of the
-group that it is meant to be connected with. Groups that components exchange have the same members,
-so a tool that connects terminals of one name connects the right variables.
+A terminal is a group of ports that a tool connects as one. It has the name of its group, unless an
+input declares another. Groups that components exchange have the same members, so a tool that
+connects terminals of one name connects the right variables.
 """
 
 from __future__ import annotations
@@ -18,10 +18,6 @@ from fmus.ports.port import Port
 #: All members of an input must be connected. Members of an output may stay unconnected: a
 #: controller takes only the angles of the posture. The rule applies to one end of a connection.
 _MATCHING_RULE = {"input": "plug", "output": "bus"}
-
-#: Outputs for inputs of other names, with their numbers of members: friction depends on all six
-#: velocities through the water. Sensors take three of them, over ground.
-_TAKES = {("nu", 6): "nu_r"}
 
 #: Corners of the icon, and the size of its unit on a screen [mm].
 _ICON = {"x1": "-100", "y1": "-100", "x2": "100", "y2": "100"}
@@ -68,8 +64,7 @@ def _terminals(parts: Mapping[str, Sequence[Port]]) -> list[Element]:
 
 
 def _terminal(part: str, name: str, members: Sequence[Port], centre: int) -> Element:
-    causality = members[0].causality
-    name = _TAKES.get((name, len(members)), name) if causality == "input" else name
+    causality, name = members[0].causality, members[0].terminal or name
     terminal = Element("Terminal", name=part + name, matchingRule=_MATCHING_RULE[causality])
     for port in members:
         SubElement(

@@ -40,12 +40,9 @@ def start(parameters: PositionFix, t: float) -> SampleState:
 
 def derive(parameters: PositionFix, state: SampleState, inputs: Inputs, t: float) -> SampleState:
     """Return the state after what is due at time t."""
-    state = sampling.arrived(parameters.sampling, state, t)
-    if not sampling.is_due(parameters.sampling, state, t):
-        return state
-    state, error = sampling.erred(sensors.position_errors(parameters), state, t)
     x, y, z = inputs.eta
-    return sampling.sampled(parameters.sampling, state, sensors.wide(x, y, z) + error, t)
+    errors, true = sensors.position_errors(parameters), sensors.wide(x, y, z)
+    return sampling.advance(parameters.sampling, errors, state, true, t)
 
 
 def update(derived: SampleState) -> SampleState:

@@ -9,10 +9,19 @@ from auv_fmu import Refusal, Variable, __author__, __license__, __version__
 from auv_fmu.language.quantities import ACCELERATION, ETA, NU, POSITION, TAU, VELOCITY
 from auv_fmu.language.vectors import Vector3, Vector6, add
 from auv_fmu.paper import plant
+from auv_fmu.paper.attitude import rotation_from_euler
+from auv_fmu.paper.control_point import control_point, control_point_velocity
 from auv_fmu.paper.euler import STEP
 from auv_fmu.remus import remus100
 from auv_fmu.remus.remus100 import Parameters, RemusState
-from auv_fmu.remus.tail import ACTUATOR, __citation__, limit_tail, margins
+from auv_fmu.remus.tail import (
+    ACTUATOR,
+    FASTEST,
+    FASTEST_TURN,
+    __citation__,
+    limit_tail,
+    margins,
+)
 
 H_MAX = STEP
 
@@ -108,13 +117,13 @@ def update(parameters: Parameters, state: RemusState, inputs: Inputs, h: float) 
 
 def outputs(parameters: Parameters, state: RemusState) -> Outputs:
     """Return the outputs; y has no noise yet."""
-    y, dy = remus100.control(state, parameters.ell)
+    rotation, ell = rotation_from_euler(*state.euler), parameters.ell
     tau = remus100.tail_forces(parameters.tail, state)
     return Outputs(
         (*state.position, *state.euler),
         state.nu,
-        y,
-        dy,
+        control_point(state.position, rotation, ell),
+        control_point_velocity(rotation, state.nu, ell),
         (tau[0], tau[4], tau[5]),
         remus100.through_water(state),
         state.actuator,
@@ -146,12 +155,9 @@ def switches(parameters: Parameters, state: RemusState, inputs: Inputs) -> Margi
 
 def event(parameters: Parameters, state: RemusState, inputs: Inputs) -> RemusState:
     """Return the same motion over ground, in water whose velocity may have jumped."""
-    return RemusState(
-        state.position,
-        state.euler,
-        state.nu,
-        limit_tail(parameters.tail, state.actuator),
-        add(parameters.current, inputs.water),
+    return state._replace(
+        actuator=limit_tail(parameters.tail, state.actuator),
+        water=add(parameters.current, inputs.water),
     )
 
 
@@ -161,4 +167,4 @@ def check_state(parameters: Parameters, state: RemusState) -> None:
     delta_max, n_max = parameters.tail.delta_max, parameters.tail.n_max
     if not (abs(delta_r) <= delta_max and abs(delta_s) <= delta_max and abs(n) <= n_max):
         raise Refusal("its fins or its propeller are beyond their limits")
-    remus100.check_speed(state)
+    plant.check_speed(remus100.through_water(state), FASTEST, FASTEST_TURN)

@@ -2,19 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-from auv_fmu import Matrix, __author__, __license__, __version__
+from auv_fmu import __author__, __license__, __version__
 from auv_fmu.bluerov2 import thruster_allocation, thrusters
-from auv_fmu.bluerov2.thruster_allocation import (
-    Allocated,
-    Parameters,
-    Wanted,
-    effect,
-    evaluate,
-    pseudo_inverse,
-)
-from auv_fmu.bluerov2.thrusters import COUNT, __citation__
+from auv_fmu.bluerov2.thruster_allocation import Allocated, Derived, Parameters, Wanted
+from auv_fmu.bluerov2.thrusters import __citation__
 
 SAMPLED = True
 
@@ -25,13 +16,11 @@ def check(parameters: Parameters) -> None:
     thruster_allocation.check(parameters.layout)
 
 
-def derive(parameters: Parameters) -> Annotated[Matrix, COUNT, 6]:
-    """Return the pseudo-inverse of the geometry of the thrusters."""
-    return pseudo_inverse(effect(parameters.layout))
+def derive(parameters: Parameters) -> Derived:
+    """Return the pseudo-inverse of the geometry, and the largest thrusts."""
+    return thruster_allocation.derive(parameters)
 
 
-def outputs(
-    parameters: Parameters, derived: Annotated[Matrix, COUNT, 6], inputs: Wanted
-) -> Allocated:
+def outputs(parameters: Parameters, derived: Derived, inputs: Wanted) -> Allocated:
     """Return the commands, and the resulting force and moment."""
-    return evaluate(parameters, derived, inputs)
+    return thruster_allocation.evaluate(parameters, derived, inputs)

@@ -174,8 +174,8 @@ def title(axes: Axes, text: str) -> None:
     # A wider legend would move the square of a path.
     abreast = 2 if axes.name == "3d" else 3
     axes.legend(
-        title=text, alignment="left", ncols=n if n <= abreast else -(-n // 2), loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
+        title=text, alignment="left", ncols=n if n <= abreast else min(abreast, -(-n // 2)),
+        loc="lower left", bbox_to_anchor=(0.0, 1.0),
     )  # fmt: skip
 
 

@@ -197,8 +197,8 @@ def test_terminals_are_the_groups_of_inputs_and_outputs(fmi3: Path):
     joined = []
     for name, (_, members) in terminals(description.modelName).items():
         (side,) = {causality[variable] for variable in members.values()}
-        # Friction and autopilots take the velocity through the water, by their own name for it.
-        takes = side == "input" and description.modelName in ("DisturbanceGenerator", "Autopilot")
+        # Friction takes the velocity through the water, by its own name for it.
+        takes = side == "input" and description.modelName == "DisturbanceGenerator"
         group = "nu" if takes and name == "nu_r" else name
         for member, variable in members.items():
             # A scalar is a group of its own.

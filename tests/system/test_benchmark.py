@@ -21,6 +21,7 @@ from orchestrator.benchmark.tuning import Budget, search, training
 from orchestrator.commands.main import main
 from orchestrator.studies.batch_engine import BatchEngine
 from orchestrator.studies.engine import FmuEngine, outcomes_of
+from orchestrator.studies.space import Space
 from orchestrator.studies.study import StopTime
 from orchestrator.studies.sweep import Means, Ready, prepare_study
 from orchestrator.vehicle.signals import true_control_point
@@ -91,7 +92,8 @@ def module(name: str) -> ModuleType:
 # Runs
 
 
-@pytest.mark.parametrize("vehicle", ["auv", *slow("bluerov", "remus")])
+@pytest.mark.slow
+@pytest.mark.parametrize("vehicle", vehicles())
 def test_fmus_make_the_same_runs(vehicle: str):
     """In every task, bit for bit."""
     made = ready("pd", vehicle, 1)
@@ -140,16 +142,19 @@ def test_numbers_of_a_run_follow_from_its_rows():
 
 
 def test_all_laws_have_the_same_draws_and_the_search_has_others():
-    spaces = [ready(law, "remus", 3).space for law in ("paper", "pd")]
-    first, second = (space.points(np.arange(18)).values for space in spaces)
+    remus = vehicles()["remus"]
+    studies = [study_of_law(laws()[law], remus, 3) for law in ("paper", "pd")]
+    first, second = (
+        Space(study, {study.name: loop_of(laws()[law], remus, {})}).points(np.arange(18)).values
+        for study, law in zip(studies, ("paper", "pd"), strict=True)
+    )
     assert first.keys() == second.keys()
     assert all((first[name] == second[name]).all() for name in first)
     # Each task has the same draws.
     seeds = first["sensors.noise.seed"].reshape(6, 3)
     assert (seeds == seeds[0]).all() and len({*seeds[0]}) == 3
-    study = study_of_law(laws()["pd"], vehicles()["remus"], 3)
-    seeds = {training(study, number).sample.seed for number in range(3)}  # type: ignore[union-attr]
-    assert len(seeds) == 3
+    for study in studies:
+        assert len({training(study, number).sample for number in range(3)}) == 3
 
 
 def test_the_vehicle_sets_what_a_law_knows_of_it():
@@ -276,6 +281,7 @@ def test_costs_and_ranks():
 # Search
 
 
+@pytest.mark.slow
 def test_search_is_the_same_for_a_seed():
     law, vehicle = laws()["learned"], vehicles()["auv"]
     budget = Budget(3, 8, 1, 2, 1)
@@ -288,6 +294,7 @@ def test_search_is_the_same_for_a_seed():
         assert 0.999 * low <= value <= 1.001 * high
 
 
+@pytest.mark.slow
 def test_search_finds_a_minimum_that_is_known(monkeypatch):
     law, vehicle = laws()["pid"], vehicles()["auv"]
     known = {"omega": 3.0, "zeta": 0.7, "T_i": 40.0, "T_f": 0.05}
@@ -346,6 +353,7 @@ def mine(workplace: Path) -> Path:
 COMMAND = ["benchmark", "my_law.py", "--runs", "2", "--vehicle", "auv", "--law", "pd"]
 
 
+@pytest.mark.slow
 def test_a_law_of_the_users_own_enters_the_table(mine: Path, capsys, monkeypatch):
     assert main(COMMAND) == 0
     out = capsys.readouterr().out
@@ -378,12 +386,14 @@ def test_its_gains_are_searched_once(mine: Path, capsys):
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("tau: Annotated", "force: Annotated", "no output tau.u a law has tau.u, tau.q, tau.r"),
-        ("y_d", "wind", "input wind.x is unknown y, eta, dy, y_d"),
         ("(1.0, 100.0)", "(1.0, 0.5)", "GAINS 0 < low < high"),
         ("(1.0, 100.0)", "range(2)", "GAINS 0 < low < high"),
-        ("    return Outputs", "    x = [1.0]\n    return Outputs", "my_law.py a list is not"),
         ("def outputs(", "def outputs((", "my_law.py line 32"),
+        *slow(
+            ("tau: Annotated", "force: Annotated", "no output tau.u a law has tau.u, tau.q, tau.r"),
+            ("y_d", "wind", "input wind.x is unknown y, eta, dy, y_d"),
+            ("    return Outputs", "    x = [1.0]\n    return Outputs", "my_law.py a list is not"),
+        ),
     ],
 )
 def test_a_component_that_cannot_be_a_law_is_refused_in_a_line(mine: Path, capsys, old, new, words):

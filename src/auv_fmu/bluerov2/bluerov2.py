@@ -7,13 +7,12 @@ mass, the origin of the body frame: x forward, y to starboard, z down.
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.bluerov2.thrusters import COUNT, Curve, Layout, forces, thrust
 from auv_fmu.language.arrays import Vector
 from auv_fmu.language.quantities import ETA, NU, POSITION, VELOCITY, Members
-from auv_fmu.language.variable import POSITIVE, Refusal, Variable
+from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import (
     Rotation,
     Vector3,
@@ -35,7 +34,7 @@ from auv_fmu.paper.attitude import (
     rotation_from_quaternion,
 )
 from auv_fmu.paper.control_point import ELL, Distance
-from auv_fmu.paper.plant import NORMALISING, Localisation, over_ground
+from auv_fmu.paper.plant import NORMALISING, Localisation, check_speed, over_ground
 
 #: Largest speed through the water [m/s], six times the largest of the vehicle. Below it the drag
 #: brakes in explicit steps of 20 ms.
@@ -205,29 +204,12 @@ def immersed(state: BlueRovState, rotation: Rotation, water: Vector3) -> BlueRov
 
     """
     nu_r = over_ground(state.nu_r, rotation, sub(state.water, water))
-    return BlueRovState(state.position, state.quaternion, nu_r, state.thrust, water)
+    return state._replace(nu_r=nu_r, water=water)
 
 
 def wanted(curve: Curve, command: Annotated[Vector, COUNT]) -> Annotated[Vector, COUNT]:
     """Steady thrusts of the commands [N]."""
     return Vector(thrust(curve, c) for c in command)
-
-
-def check_speed(nu_r: Vector6) -> None:
-    """Refuse a motion for which the model does not hold.
-
-    Raises:
-        Refusal: it is faster than :data:`FASTEST`, or turns faster than :data:`FASTEST_TURN`.
-
-    """
-    u, v, w, p, q, r = nu_r
-    speed, turn = sqrt(u * u + v * v + w * w), sqrt(p * p + q * q + r * r)
-    if not (speed <= FASTEST and turn <= FASTEST_TURN):
-        raise Refusal(
-            f"the vehicle moves at {speed:.3g} m/s through the water and turns at {turn:.3g} "
-            f"rad/s; the model ends at {FASTEST:g} m/s and {FASTEST_TURN:g} rad/s: mend water, "
-            "nu0 or h_max"
-        )
 
 
 def begin(parameters: Parameters, water: Vector3) -> BlueRovState:
@@ -243,7 +225,7 @@ def begin(parameters: Parameters, water: Vector3) -> BlueRovState:
     rest = Vector(0.0 for _ in range(COUNT))
     state = BlueRovState((x, y, z), quaternion, parameters.nu0, rest, (0.0, 0.0, 0.0))
     state = immersed(state, rotation_from_quaternion(quaternion), flow(parameters, water))
-    check_speed(state.nu_r)
+    check_speed(state.nu_r, FASTEST, FASTEST_TURN)
     return state
 
 
@@ -272,7 +254,7 @@ def advance(
 
     """
     state = immersed(state, rotation, flow(parameters, water))
-    check_speed(state.nu_r)
+    check_speed(state.nu_r, FASTEST, FASTEST_TURN)
     aim = wanted(parameters.curve, command)
     lacking = state.thrust - aim
     mean = aim + mean_response(1.0, 0.0, parameters.T, h) * lacking
@@ -284,7 +266,7 @@ def advance(
     a, b, c, d = state.quaternion
     da, db, dc, dd = quaternion_rates(state.quaternion, (p, q, r))
     nu_r = u + h * du, v + h * dv, w + h * dw, p + h * dp, q + h * dq, r + h * dr
-    check_speed(nu_r)
+    check_speed(nu_r, FASTEST, FASTEST_TURN)
     return BlueRovState(
         add_scaled(add_scaled(state.position, h, velocity), 0.5 * h * h, dwater),
         normalised((a + h * da, b + h * db, c + h * dc, d + h * dd)),
@@ -318,7 +300,7 @@ def rates(
 
     """
     now = immersed(state, rotation, flow(parameters, water))
-    check_speed(now.nu_r)
+    check_speed(now.nu_r, FASTEST, FASTEST_TURN)
     tau = forces(parameters.layout, state.thrust)
     du, dv, dw, dp, dq, dr = accelerations(parameters, now.nu_r, rotation, tau, tau_w, dwater)
     u, v, w, p, q, r = now.nu_r

@@ -44,6 +44,14 @@ class Allocated(NamedTuple):
     tau_attained: Annotated[Vector6, Variable(TAU_W, "Force and moment that the commands give")]
 
 
+class Derived(NamedTuple):
+    """Values that depend on parameters only."""
+
+    P: Annotated[Matrix, COUNT, 6]  #: pseudo-inverse of the geometry of the thrusters
+    ahead: float  #: largest thrust ahead [N]
+    astern: float  #: largest thrust astern [N]
+
+
 def effect(layout: Layout) -> Annotated[Matrix, 6, COUNT]:
     """The matrix B of force and moment per thrust [1, m].
 
@@ -85,7 +93,13 @@ def check(layout: Layout) -> None:
             raise Refusal("the thrusters do not reach all six directions")
 
 
-def evaluate(parameters: Parameters, P: Annotated[Matrix, COUNT, 6], wanted: Wanted) -> Allocated:
+def derive(parameters: Parameters) -> Derived:
+    """Pseudo-inverse and largest thrusts, for :func:`evaluate`."""
+    P = pseudo_inverse(effect(parameters.layout))
+    return Derived(P, thrust(parameters.curve, 1.0), -thrust(parameters.curve, -1.0))
+
+
+def evaluate(parameters: Parameters, derived: Derived, wanted: Wanted) -> Allocated:
     """Commands of the thrusters for a force and a moment.
 
     If a thruster would have to give more than it can, all thrusts are scaled down together, so that
@@ -93,17 +107,16 @@ def evaluate(parameters: Parameters, P: Annotated[Matrix, COUNT, 6], wanted: Wan
 
     Args:
         parameters: of the allocation.
-        P: pseudo-inverse of the geometry of the thrusters.
+        derived: from the same parameters.
         wanted: force and moment [N, N.m].
 
     """
     (u, q, r), (v, w, p) = wanted
     curve = parameters.curve
-    thrusts = P @ Vector((u, v, w, p, q, r))
-    ahead, astern = thrust(curve, 1.0), -thrust(curve, -1.0)
+    thrusts = derived.P @ Vector((u, v, w, p, q, r))
     share = 1.0
     for f in thrusts:
-        most = ahead if f > 0.0 else astern
+        most = derived.ahead if f > 0.0 else derived.astern
         if abs(f) * share > most:
             share = most / abs(f)
     command = Vector(command_of(curve, share * f) for f in thrusts)

@@ -19,7 +19,7 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.random_numbers import MESSAGE_LOSSES, start, uniform
-from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.language.variable import POSITIVE, Refusal, Variable
 from auv_fmu.language.vectors import Vector3, distance
 
 #: Shortest period [s], which no modem reaches.
@@ -37,10 +37,6 @@ _ROUNDING = 1e-6
 #: Numbers in a place of the queue, and an empty place. The last number of an occupied one is 1.
 _NUMBERS = 9
 _EMPTY = Vector((0.0,) * _NUMBERS)
-
-
-class BadLink(ArithmeticError):
-    """Parameters that no link can have, or a step that is too long."""
 
 
 class Parameters(NamedTuple):
@@ -84,12 +80,12 @@ def check(parameters: Parameters) -> None:
     """Refuse a link with more messages under way than :data:`PLACES`.
 
     Raises:
-        BadLink: the latency is too long for the period.
+        Refusal: the latency is too long for the period.
 
     """
     period, latency = parameters.period, parameters.latency
     if latency > PLACES * period:
-        raise BadLink(
+        raise Refusal(
             f"a latency of {latency:g} s with a message every {period:g} s: more than {PLACES:d} "
             f"would be under way; raise period or reduce latency"
         )
@@ -108,18 +104,6 @@ def first_state(parameters: Parameters, y: Vector3, eta: Vector3, t: float) -> L
     random = start(parameters.seed, MESSAGE_LOSSES)
     queue = Matrix((0.0 for j in range(_NUMBERS)) for i in range(PLACES))
     return LinkState(t, 0, random, queue, Message(t, y, eta), 0, 0)
-
-
-def delay(parameters: Parameters, y: Vector3, receiver: Vector3) -> float:
-    """Time that a message is under way [s].
-
-    Args:
-        parameters: of the link.
-        y: position of the sender [m].
-        receiver: position of the receiver at the time of sending [m].
-
-    """
-    return parameters.latency + distance(y, receiver) / parameters.sound_speed
 
 
 def advance(
@@ -146,21 +130,21 @@ def advance(
         h: step [s].
 
     Raises:
-        BadLink: the step has too many messages.
+        Refusal: the step has too many messages.
 
     """
     before, end = t + h - _ROUNDING * h, t + h + _ROUNDING * h
     due = (before - next_time(parameters, state)) / parameters.period
     if not due <= MOST_IN_A_STEP:
-        raise BadLink(
+        raise Refusal(
             f"a step of {h:g} s has more than {MOST_IN_A_STEP:d} messages; raise period or take "
             f"shorter steps"
         )
-    k = 0
+    delay, k = parameters.latency + distance(y, receiver) / parameters.sound_speed, 0
     while next_time(parameters, state) < before and k <= due:
         message = Message(next_time(parameters, state), y, eta)
         state = arrived(state, message.sent)
-        state = sent(parameters, state, message, delay(parameters, y, receiver))
+        state = sent(parameters, state, message, delay)
         k = k + 1
     return arrived(state, end)
 

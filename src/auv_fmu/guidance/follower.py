@@ -9,16 +9,12 @@ from __future__ import annotations
 from math import atan2, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.language.variable import Variable
+from auv_fmu.language.variable import Refusal, Variable
 from auv_fmu.language.vectors import Vector3, Vector5, add_scaled, norm
 from auv_fmu.paper.actuators import Limits
 from auv_fmu.paper.control_point import ELL, Distance
 from auv_fmu.paper.motion_planner import Reference
 from auv_fmu.paper.vehicle import Vehicle
-
-
-class ImpossiblePath(ArithmeticError):
-    """The vehicle cannot follow the path."""
 
 
 class Follower(NamedTuple):
@@ -133,13 +129,11 @@ def check(follower: Follower) -> None:
     """Refuse a vehicle for which :func:`demand` has no answer.
 
     Raises:
-        ImpossiblePath: nothing limits its drift.
+        Refusal: nothing limits its drift.
 
     """
     if not (follower.vehicle.d22 > 0.0 and follower.vehicle.d33 > 0.0):
-        raise ImpossiblePath(
-            "d22 and d33 must be positive: nothing else limits the drift in a turn"
-        )
+        raise Refusal("d22 and d33 must be positive: nothing else limits the drift in a turn")
 
 
 def check_demand(
@@ -154,12 +148,12 @@ def check_demand(
         advice: end of the message.
 
     Raises:
-        ImpossiblePath: the demand exceeds a limit.
+        Refusal: the demand exceeds a limit.
 
     """
     asked, (x, y, z) = demand(follower.vehicle, follower.ell, moment), moment.y_d
     if not asked.is_steady:
-        raise ImpossiblePath(
+        raise Refusal(
             f"{before}{number:g}{after}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path turns at "
             f"{asked.turn:.3g} rad/s with {asked.speed:.3g} m/s: more tightly than the vehicle's "
             f"control point can, {follower.ell:g} m ahead; {advice}"
@@ -168,7 +162,7 @@ def check_demand(
     def check_range(what: str, value: float, least: float, most: float, unit: str) -> None:
         if not least <= value <= most:
             limit = least if value < least else most
-            raise ImpossiblePath(
+            raise Refusal(
                 f"{before}{number:g}{after}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path asks for "
                 f"{what} of {value:.3g} {unit}, {abs(value - limit):.2g} beyond the limit of "
                 f"{limit:.3g}; {advice}"

@@ -36,7 +36,7 @@ from typing import Annotated, NamedTuple
 from auv_fmu.guidance import follower
 from auv_fmu.guidance.follower import Follower
 from auv_fmu.language.quantities import ACCELERATION, POSITION, VELOCITY
-from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.language.variable import POSITIVE, Refusal, Variable
 from auv_fmu.language.vectors import (
     Vector3,
     Vector4,
@@ -67,10 +67,6 @@ PEAK_ACCELERATION = 10.0 / sqrt(3.0)
 _DIAGONAL = sqrt(0.5)
 
 _NOWHERE: Vector3 = (0.0, 0.0, 0.0)
-
-
-class ImpossibleFormation(ArithmeticError):
-    """The vehicle cannot keep its place."""
 
 
 class Shape(IntEnum):
@@ -251,8 +247,8 @@ def place(parameters: Parameters, t: float) -> Place:
     stages = parameters.stages
     before = offset(parameters, 0)
     d, dd, ddd = before, _NOWHERE, _NOWHERE
-    for k in range(1, MOST):
-        if k < stages.n and t > stages.t[k - 1]:
+    for k in range(1, stages.n):
+        if t > stages.t[k - 1]:
             T = stages.duration[k - 1]
             a = (t - stages.t[k - 1]) / T
             after = offset(parameters, k)
@@ -404,7 +400,7 @@ def reference(parameters: Parameters, state: FormationState, known: Known, t: fl
         t: time [s].
 
     Raises:
-        ImpossiblePath: the leader is known, and the vehicle cannot keep its place.
+        Refusal: the leader is known, and the vehicle cannot keep its place.
 
     """
     y_0, dy_0, ddy_0 = leader(parameters, state, known)
@@ -461,7 +457,7 @@ def check_reference(vehicle: Follower, wanted: Reference, t: float) -> None:
     side then move back, so their course turns round at low speed, which no steady motion does.
 
     Raises:
-        ImpossiblePath: a limit is exceeded.
+        Refusal: a limit is exceeded.
 
     """
     if not follower.is_easy(vehicle, wanted):
@@ -479,36 +475,35 @@ def check(parameters: Parameters) -> None:
     """Refuse changes of stage that the vehicle cannot make.
 
     Raises:
-        ImpossibleFormation: a change is too fast, or begins before the one before is over.
+        Refusal: a change is too fast, or begins before the one before is over.
 
     """
     stages, (vehicle, _, limits, speed_max, _) = parameters.stages, parameters.follower
     if parameters.number > parameters.vehicles:
-        raise ImpossibleFormation(
+        raise Refusal(
             f"number is {parameters.number:d}, and there are {parameters.vehicles:d} vehicles: "
             f"raise vehicles or choose an earlier place"
         )
     follower.check(parameters.follower)
     most = min(limits.tau_max[0], -limits.tau_min[0])
-    for k in range(1, MOST):
-        if k < stages.n:
-            t, T = stages.t[k - 1], stages.duration[k - 1]
-            if k > 1 and t < stages.t[k - 2] + stages.duration[k - 2]:
-                raise ImpossibleFormation(
-                    f"the change to stage {k + 1:d} begins at {t:g} s, before that to stage {k:d} "
-                    f"is over at {stages.t[k - 2] + stages.duration[k - 2]:g} s; start it later"
-                )
-            way = distance(offset(parameters, k), offset(parameters, k - 1))
-            speed = PEAK_SPEED * way / T
-            if speed > speed_max:
-                raise ImpossibleFormation(
-                    f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
-                    f"{speed:.3g} m/s, more than speed_max, {speed_max:g}; give it at "
-                    f"least {PEAK_SPEED * way / speed_max:.3g} s"
-                )
-            force = vehicle.m11 * PEAK_ACCELERATION * way / (T * T)
-            if force > most:
-                raise ImpossibleFormation(
-                    f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
-                    f"{force:.3g} N, more than the {most:g} N of (3); give it more time"
-                )
+    for k in range(1, stages.n):
+        t, T = stages.t[k - 1], stages.duration[k - 1]
+        if k > 1 and t < stages.t[k - 2] + stages.duration[k - 2]:
+            raise Refusal(
+                f"the change to stage {k + 1:d} begins at {t:g} s, before that to stage {k:d} "
+                f"is over at {stages.t[k - 2] + stages.duration[k - 2]:g} s; start it later"
+            )
+        way = distance(offset(parameters, k), offset(parameters, k - 1))
+        speed = PEAK_SPEED * way / T
+        if speed > speed_max:
+            raise Refusal(
+                f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
+                f"{speed:.3g} m/s, more than speed_max, {speed_max:g}; give it at "
+                f"least {PEAK_SPEED * way / speed_max:.3g} s"
+            )
+        force = vehicle.m11 * PEAK_ACCELERATION * way / (T * T)
+        if force > most:
+            raise Refusal(
+                f"the change to stage {k + 1:d}, by {way:.3g} m in {T:g} s, takes up to "
+                f"{force:.3g} N, more than the {most:g} N of (3); give it more time"
+            )

@@ -35,11 +35,10 @@ from enum import IntEnum
 from math import atan, atan2, cos, degrees, exp, pi, sin, sqrt
 from typing import Annotated, NamedTuple
 
-from auv_fmu.guidance.follower import ImpossiblePath
 from auv_fmu.guidance.path_planner import Count, Down, East, North
 from auv_fmu.language.quantities import POSITION
-from auv_fmu.language.variable import POSITIVE, Variable
-from auv_fmu.language.vectors import Vector3, add_scaled, distance
+from auv_fmu.language.variable import POSITIVE, Refusal, Variable
+from auv_fmu.language.vectors import Vector3, add_scaled, distance, sub
 from auv_fmu.paper.actuators import limit
 from auv_fmu.paper.motion_planner import STEEPEST
 
@@ -146,7 +145,7 @@ def leg(path: Path, k: int) -> Leg:
     """
     before = k if k < path.n else path.n - 1
     begin, end = waypoint(path, before), waypoint(path, before + 1)
-    dx, dy, dz = end[0] - begin[0], end[1] - begin[1], end[2] - begin[2]
+    dx, dy, dz = sub(end, begin)
     azimuth = atan2(dy, dx)
     if k >= path.n:
         return Leg(end, azimuth, 0.0, 0.0)
@@ -163,8 +162,7 @@ def errors(line: Leg, place: Vector3) -> Vector3:
     """
     cos_h, sin_h = cos(line.azimuth), sin(line.azimuth)
     cos_v, sin_v = cos(line.elevation), sin(line.elevation)
-    x, y, z = line.begin
-    dx, dy, dz = place[0] - x, place[1] - y, place[2] - z
+    dx, dy, dz = sub(place, line.begin)
     ahead = dx * cos_h + dy * sin_h
     return (
         ahead * cos_v - dz * sin_v,
@@ -203,18 +201,18 @@ def check(path: Path, radius: float) -> None:
     """Refuse waypoints between which there is no guidance.
 
     Raises:
-        ImpossiblePath: a leg is too short or too steep.
+        Refusal: a leg is too short or too steep.
 
     """
     for k in range(1, path.n):
         line = leg(path, k)
         if not radius < line.length:
-            raise ImpossiblePath(
+            raise Refusal(
                 f"waypoints {k:d} and {k + 1:d} are {line.length:g} m apart, which must be more "
                 f"than radius = {radius:g} m"
             )
         if abs(line.elevation) > STEEPEST:
-            raise ImpossiblePath(
+            raise Refusal(
                 f"the leg from waypoint {k:d} to {k + 1:d} climbs or dives at "
                 f"{degrees(abs(line.elevation)):.1f} degrees, and the limit is "
                 f"{degrees(STEEPEST):g}"

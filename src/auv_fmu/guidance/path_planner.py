@@ -31,25 +31,18 @@ from math import atan2, degrees, sqrt, tan
 from typing import Annotated, NamedTuple
 
 from auv_fmu.guidance import follower
-from auv_fmu.guidance.follower import Follower, ImpossiblePath
-from auv_fmu.language.variable import POSITIVE, Variable
-from auv_fmu.language.vectors import (
-    Vector3,
-    Vector32,
-    add_scaled,
-    distance,
-    norm,
-    sub,
-)
+from auv_fmu.guidance.follower import Follower
+from auv_fmu.language.variable import POSITIVE, Refusal, Variable
+from auv_fmu.language.vectors import Vector3, Vector32, add_scaled, distance, norm, sub
 from auv_fmu.paper.motion_planner import STEEPEST, Reference
 
 #: Most waypoints of a path, as many as a Vector32 holds; and zeros for those that are not used.
 MOST = 32
 _UNUSED = (0.0,) * 26
 
-#: Interval between the checks of a rounding, as a share of it. They include its middle, which is
-#: the most demanding instant of a corner between equal speeds.
-_BETWEEN = 1 / 32
+#: Number of intervals between the checks of a rounding. They include its middle, which is the most
+#: demanding instant of a corner between equal speeds.
+_INTERVALS = 32
 
 #: Square of the steepest slope.
 _STEEPEST_SLOPE = tan(STEEPEST) * tan(STEEPEST)
@@ -78,33 +71,9 @@ class Waypoints(NamedTuple):
     """Waypoints and times; the defaults are a small survey near the vehicle of Fig. 4."""
 
     n: Count = 6
-    x: North = (
-        3.0,
-        15.0,
-        15.0,
-        3.0,
-        3.0,
-        15.0,
-        *_UNUSED,
-    )
-    y: East = (
-        6.0,
-        6.0,
-        10.0,
-        10.0,
-        14.0,
-        14.0,
-        *_UNUSED,
-    )
-    z: Down = (
-        0.0,
-        4.0,
-        4.0,
-        4.0,
-        4.0,
-        0.0,
-        *_UNUSED,
-    )
+    x: North = (3.0, 15.0, 15.0, 3.0, 3.0, 15.0, *_UNUSED)
+    y: East = (6.0, 6.0, 10.0, 10.0, 14.0, 14.0, *_UNUSED)
+    z: Down = (0.0, 4.0, 4.0, 4.0, 4.0, 0.0, *_UNUSED)
     t: Annotated[
         Vector32,
         Variable("s", "Time at which the waypoint is passed, if `timed`", name="waypoint[{}].t"),
@@ -279,17 +248,15 @@ def check(parameters: Parameters) -> None:
     """Refuse a path that the vehicle cannot follow, with the place.
 
     Raises:
-        ImpossiblePath: the waypoints make no path, or the path exceeds a limit.
+        Refusal: the waypoints make no path, or the path exceeds a limit.
 
     """
     waypoints = parameters.waypoints
     follower.check(parameters.follower)
-    k = 1
-    while k < waypoints.n:
+    for k in range(1, waypoints.n):
         _check_leg(waypoints, k)
-        k = k + 1
     if norm(course(waypoints, first_corner(waypoints, 0.0), _AT_REST)) == 0.0:
-        raise ImpossiblePath("all waypoints are the same: there is no path between them")
+        raise Refusal("all waypoints are the same: there is no path between them")
     _check_pitch(waypoints)
     corner = first_corner(waypoints, 0.0)
     ahead = corner
@@ -304,17 +271,17 @@ def _check_leg(waypoints: Waypoints, k: int) -> None:
     before, behind = waypoint(waypoints, k - 1), waypoint(waypoints, k)
     x, y, z = sub(behind, before)
     if waypoints.timed and not waypoints.t[k] > waypoints.t[k - 1]:
-        raise ImpossiblePath(
+        raise Refusal(
             f"waypoint {k + 1:d} has the time {waypoints.t[k]:g} s, and the one before it "
             f"{waypoints.t[k - 1]:g} s: times must increase"
         )
     if not waypoints.timed and distance(before, behind) == 0.0:
-        raise ImpossiblePath(
+        raise Refusal(
             f"waypoints {k:d} and {k + 1:d} are the same; only waypoints with times can rest"
         )
     climb = atan2(abs(z), sqrt(x * x + y * y))
     if climb > STEEPEST:
-        raise ImpossiblePath(
+        raise Refusal(
             f"the leg from waypoint {k:d} to {k + 1:d} climbs or dives at {degrees(climb):.1f} "
             f"degrees, {degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
             f"(1) has a pole at 90"
@@ -327,11 +294,9 @@ def _check_pitch(waypoints: Waypoints) -> None:
     From one instant at which a rounding begins or ends to the next, dy_d is a cubic polynomial.
     """
     opening, closing = first_corner(waypoints, 0.0), first_corner(waypoints, 0.0)
-    begin, fastest, k = opening.t - waypoints.rounding / 2, 0.0, 1
-    while k < waypoints.n:
-        speed = norm(velocity(waypoints, k))
-        fastest = speed if speed > fastest else fastest
-        k = k + 1
+    begin, fastest = opening.t - waypoints.rounding / 2, 0.0
+    for k in range(1, waypoints.n):
+        fastest = max(fastest, norm(velocity(waypoints, k)))
     while closing.k < waypoints.n:
         ahead, end = closing, closing.t + waypoints.rounding / 2
         if opening.k < waypoints.n and opening.t - waypoints.rounding / 2 < end:
@@ -372,14 +337,14 @@ def _check_pitch_between(
             (x, y, z), dy_d, _ = reference(waypoints, corner, t)
             climb = atan2(abs(dy_d[2]), sqrt(dy_d[0] * dy_d[0] + dy_d[1] * dy_d[1]))
             if _steepness(dy_d, dy_d, fastest) > 0.0:
-                raise ImpossiblePath(
+                raise Refusal(
                     f"near waypoint {corner.k + 1:d}, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path "
                     f"climbs or dives at {degrees(climb):.1f} degrees, "
                     f"{degrees(climb - STEEPEST):.2g} beyond the limit of {degrees(STEEPEST):g}: "
                     f"(1) has a pole at 90; insert a less steep leg"
                 )
             if share < _SHORTEST:
-                raise ImpossiblePath(
+                raise Refusal(
                     f"the path turns straight back at waypoint {corner.k + 1:d}, which no "
                     f"vehicle can follow; add a waypoint to one side"
                 )
@@ -435,9 +400,9 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
 
     """
     waypoints = parameters.waypoints
-    before, i = _AT_REST, 0
-    while i * _BETWEEN <= 1.0:
-        t = corner.t + waypoints.rounding * (i * _BETWEEN - 0.5)
+    before = _AT_REST
+    for i in range(_INTERVALS + 1):
+        t = corner.t + waypoints.rounding * (i / _INTERVALS - 0.5)
         moment = reference(waypoints, corner_ahead(waypoints, ahead, t), t)
         dx, dy, dz = moment.dy_d
         # The pitch has been checked: a vertical velocity is a rounding error of zero.
@@ -445,7 +410,7 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
         if before[0] * dx + before[1] * dy + before[2] * dz < 0.0 or (
             not moves and norm(moment.ddy_d) > 0.0
         ):
-            raise ImpossiblePath(
+            raise Refusal(
                 f"the path turns straight back at waypoint {corner.k + 1:d}, which no vehicle "
                 f"can follow; add a waypoint to one side"
             )
@@ -459,4 +424,3 @@ def _check_rounding(parameters: Parameters, corner: Corner, ahead: Corner) -> No
                 "reduce the speed, or turn more widely with a longer rounding",
             )
         before = moment.dy_d
-        i = i + 1

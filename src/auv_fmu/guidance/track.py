@@ -20,7 +20,8 @@ from math import atan2, ceil, degrees, sqrt
 from typing import NamedTuple
 
 from auv_fmu.guidance import follower
-from auv_fmu.guidance.follower import Follower, ImpossiblePath
+from auv_fmu.guidance.follower import Follower
+from auv_fmu.language.variable import Refusal
 from auv_fmu.language.vectors import Vector3, norm, scale
 from auv_fmu.paper.motion_planner import STEEPEST, Reference
 
@@ -103,7 +104,7 @@ def check(vehicle: Follower, before: Row, after: Row, moved: Row, head: str) -> 
         The last such instant so far.
 
     Raises:
-        ImpossiblePath: a limit is exceeded, or the path is too steep or turns straight back.
+        Refusal: a limit is exceeded, or the path is too steep or turns straight back.
 
     """
     T = after.t - before.t
@@ -122,13 +123,13 @@ def check(vehicle: Follower, before: Row, after: Row, moved: Row, head: str) -> 
         u, v, w = moved.dy
         climb = atan2(abs(dz), sqrt(dx * dx + dy * dy))
         if climb > STEEPEST:
-            raise ImpossiblePath(
+            raise Refusal(
                 f"{head}{t:g} s, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path climbs or dives at "
                 f"{degrees(climb):.1f} degrees, {degrees(climb - STEEPEST):.2g} beyond the limit "
                 f"of {degrees(STEEPEST):g}: (1) has a pole at 90"
             )
         if speed > _GENTLE and t - moved.t < _REST and u * dx + v * dy + w * dz < 0.0:
-            raise ImpossiblePath(
+            raise Refusal(
                 f"{head}{t:g} s, at ({x:.3g}, {y:.3g}, {z:.3g}) m, the path turns straight back; "
                 f"let it turn to one side, or rest for {_REST:g} s"
             )

@@ -35,6 +35,8 @@ class Variable:
             hook `start` takes them.
         name: name of the port, if it is not the field's; `{}` stands for the member. For a field
             that is a NamedTuple: prefix of the names of its fields, "" for none.
+        terminal: for an input: the terminal of FMI 3.0 that it is meant to be connected with; None:
+            one with the name of its group.
 
     """
 
@@ -47,6 +49,7 @@ class Variable:
     feedthrough: tuple[str, ...] | None = None
     initially: tuple[str, ...] | None = None
     name: str | None = None
+    terminal: str | None = None
 
     def __hash__(self) -> int:
         """Hash of the parts that are hashable."""

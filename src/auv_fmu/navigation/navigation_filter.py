@@ -37,14 +37,7 @@ from math import radians, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu.language.arrays import Matrix, Vector
-from auv_fmu.language.quantities import (
-    ACCELERATION,
-    ETA,
-    NU,
-    POSITION,
-    VELOCITY,
-    Members,
-)
+from auv_fmu.language.quantities import ACCELERATION, ETA, NU, POSITION, VELOCITY, Members
 from auv_fmu.language.variable import POSITIVE, Variable
 from auv_fmu.language.vectors import (
     Rotation,
@@ -539,7 +532,9 @@ def correction(P: Matrix, found: Measurement) -> Correction:
 
     """
     dx, nis = Vector((0.0,) * SIZE), 0.0
-    for k in range(found.n):
+    for k in range(MOST):
+        if k >= found.n:
+            break
         H, std = found.H[k], found.std[k]
         PH = P @ H
         variance = H @ PH + std * std

@@ -17,7 +17,7 @@ from typing import Annotated, NamedTuple
 
 from auv_fmu.language.arrays import Matrix, Vector
 from auv_fmu.language.random_numbers import gaussian, start, uniform
-from auv_fmu.language.variable import Variable
+from auv_fmu.language.variable import Refusal, Variable
 
 #: Most numbers in a sample; a sensor with fewer leaves the last ones zero.
 WIDTH = 6
@@ -30,10 +30,6 @@ _ROUNDING = 1e-6
 _MOMENT = 1e-9
 
 _ZERO = Vector((0.0,) * WIDTH)
-
-
-class BadSampling(ArithmeticError):
-    """Parameters that no sensor can have."""
 
 
 class Sampling(NamedTuple):
@@ -83,12 +79,12 @@ def check(sampling: Sampling) -> None:
         sampling: parameters.
 
     Raises:
-        BadSampling: the delay is too long for the period.
+        Refusal: the delay is too long for the period.
 
     """
     period, delay = sampling.period, sampling.delay
     if delay > PLACES * period:
-        raise BadSampling(
+        raise Refusal(
             f"a delay of {delay:g} s with a sample every {period:g} s: more than {PLACES:d} would "
             f"be under way; raise period or reduce delay"
         )
@@ -106,6 +102,25 @@ def begin(sampling: Sampling, errors: Errors, stream: int, t: float) -> SampleSt
     random, bias = drawn(start(sampling.seed, stream), errors.bias)
     queue = Matrix((0.0 for j in range(WIDTH + 1)) for i in range(PLACES))
     return SampleState(t, 0.0, t, random, bias, _ZERO, t, False, queue, 0, 0)
+
+
+def advance(
+    sampling: Sampling, errors: Errors, state: SampleState, true: Vector, t: float
+) -> SampleState:
+    """State after what is due at a time, of a sensor whose errors add to the true numbers.
+
+    Args:
+        sampling, errors: parameters.
+        state: after the last step.
+        true: numbers of a sample without errors.
+        t: time [s].
+
+    """
+    state = arrived(sampling, state, t)
+    if not is_due(sampling, state, t):
+        return state
+    state, error = erred(errors, state, t)
+    return sampled(sampling, state, true + error, t)
 
 
 def drawn(random: float, std: Vector) -> tuple[float, Vector]:

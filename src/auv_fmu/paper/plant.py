@@ -10,12 +10,12 @@ water that moves, actuators with dynamics, and an integrator of fourth order.
 from __future__ import annotations
 
 from enum import IntEnum
-from math import cos, sin
+from math import cos, sin, sqrt
 from random import Random
 from typing import Annotated, NamedTuple
 
 from auv_fmu.language.quantities import ETA, LAG, NU, POSITION, TAU, VELOCITY
-from auv_fmu.language.variable import POSITIVE, Variable
+from auv_fmu.language.variable import POSITIVE, Refusal, Variable
 from auv_fmu.language.vectors import (
     Rotation,
     Vector3,
@@ -184,6 +184,28 @@ def over_ground(nu_r: Vector6, rotation: Rotation, water: Vector3) -> Vector6:
     u, v, w, p, q, r = nu_r
     u_c, v_c, w_c = rotate_back(rotation, water)
     return u + u_c, v + v_c, w + w_c, p, q, r
+
+
+def check_speed(nu_r: Vector6, fastest: float, fastest_turn: float) -> None:
+    """Refuse a motion for which a model does not hold; the plant has no such limits.
+
+    Args:
+        nu_r: (u, v, w, p, q, r) through the water [m/s, rad/s].
+        fastest: largest speed [m/s].
+        fastest_turn: largest rate of turn [rad/s].
+
+    Raises:
+        Refusal: the motion is faster.
+
+    """
+    u, v, w, p, q, r = nu_r
+    speed, turn = sqrt(u * u + v * v + w * w), sqrt(p * p + q * q + r * r)
+    if not (speed <= fastest and turn <= fastest_turn):
+        raise Refusal(
+            f"the vehicle moves at {speed:.3g} m/s through the water and turns at {turn:.3g} "
+            f"rad/s; the model ends at {fastest:g} m/s and {fastest_turn:g} rad/s: mend water, "
+            "nu0 or h_max"
+        )
 
 
 def immersed(state: PlantState, rotation: Rotation, water: Vector3) -> PlantState:

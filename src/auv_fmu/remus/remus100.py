@@ -18,8 +18,8 @@ from auv_fmu.language.quantities import ETA, EULER, NU, POSITION, VELOCITY
 from auv_fmu.language.variable import Refusal, Variable
 from auv_fmu.language.vectors import Vector3, Vector6, add, add_scaled
 from auv_fmu.paper.attitude import rotate, rotation_from_euler
-from auv_fmu.paper.control_point import ELL, Distance, control_point, control_point_velocity
-from auv_fmu.paper.plant import Localisation
+from auv_fmu.paper.control_point import ELL, Distance
+from auv_fmu.paper.plant import Localisation, check_speed
 from auv_fmu.remus import prestero
 from auv_fmu.remus.hull import (
     Drag,
@@ -45,9 +45,8 @@ class Form(IntEnum):
 #: Module-level name, which Python looks up faster than a member of the class.
 COEFFICIENTS = Form.COEFFICIENTS
 
-
-class TooFast(ArithmeticError):
-    """A motion through the water for which the model does not hold."""
+#: At rest.
+_STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Parameters(NamedTuple):
@@ -61,15 +60,8 @@ class Parameters(NamedTuple):
         float, Variable("s", "Time constant of the propeller", 0.0, name="propeller.T")
     ] = 1.0
     ell: Distance = ELL
-    eta0: Annotated[Vector6, Variable(ETA, "Initial posture")] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    nu0: Annotated[Vector6, Variable(NU, "Initial velocity in the body frame")] = (
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
+    eta0: Annotated[Vector6, Variable(ETA, "Initial posture")] = _STILL
+    nu0: Annotated[Vector6, Variable(NU, "Initial velocity in the body frame")] = _STILL
     noise: Localisation = Localisation()
     current: Annotated[
         Vector3, Variable(VELOCITY, "Ocean current in the earth frame", tunable=True)
@@ -326,11 +318,10 @@ def rates(
     if not (T_delta > 0.0 and T_n > 0.0):
         raise Refusal("model exchange needs a fin.T and a propeller.T above 0")
     delta_r, delta_s, n = state.actuator
-    actuator = limit_tail(tail, state.actuator)
-    state = RemusState(
-        state.position, state.euler, state.nu, actuator, add(parameters.current, water)
+    state = state._replace(
+        actuator=limit_tail(tail, state.actuator), water=add(parameters.current, water)
     )
-    check_speed(state)
+    check_speed(through_water(state), FASTEST, FASTEST_TURN)
     du, dv, dw, dp, dq, dr = accelerations(parameters, inertia_of(parameters), state)
     phi, theta, psi = state.euler
     u, v, w, p, q, r = state.nu
@@ -348,25 +339,6 @@ def rates(
     )
 
 
-def check_speed(state: RemusState) -> None:
-    """Refuse a motion for which the model does not hold.
-
-    Raises:
-        TooFast: it moves through the water faster than :data:`.tail.FASTEST`, or turns faster than
-            :data:`.tail.FASTEST_TURN`.
-
-    """
-    u, v, w, p, q, r = through_water(state)
-    speed = sqrt(u * u + v * v + w * w)
-    turn = sqrt(p * p + q * q + r * r)
-    if not (speed <= FASTEST and turn <= FASTEST_TURN):
-        raise TooFast(
-            f"the vehicle moves at {speed:.3g} m/s through the water and turns at {turn:.3g} "
-            f"rad/s; the model ends at {FASTEST:g} m/s and {FASTEST_TURN:g} rad/s: mend water, nu0 "
-            "or h_max"
-        )
-
-
 def begin(parameters: Parameters, water: Vector3) -> RemusState:
     """State at the start, with fins amidships and a propeller at rest.
 
@@ -378,7 +350,7 @@ def begin(parameters: Parameters, water: Vector3) -> RemusState:
     x, y, z, phi, theta, psi = parameters.eta0
     flow = add(parameters.current, water)
     state = RemusState((x, y, z), (phi, theta, psi), parameters.nu0, (0.0, 0.0, 0.0), flow)
-    check_speed(state)
+    check_speed(through_water(state), FASTEST, FASTEST_TURN)
     return state
 
 
@@ -401,26 +373,8 @@ def advance(
         h: step [s].
 
     """
-    flow = add(parameters.current, water)
-    state = RemusState(state.position, state.euler, state.nu, state.actuator, flow)
-    check_speed(state)
-    mass = inertia_of(parameters)
-    state = carried(step(parameters, mass, state, command, h), dwater, h)
-    check_speed(state)
+    state = state._replace(water=add(parameters.current, water))
+    check_speed(through_water(state), FASTEST, FASTEST_TURN)
+    state = carried(step(parameters, inertia_of(parameters), state, command, h), dwater, h)
+    check_speed(through_water(state), FASTEST, FASTEST_TURN)
     return state
-
-
-def control(state: RemusState, ell: float) -> tuple[Vector3, Vector3]:
-    """The control point [m] and its velocity [m/s], earth frame: (9) and (10).
-
-    Args:
-        state: of the vehicle.
-        ell: distance of the control point from the centre of buoyancy [m].
-
-    """
-    phi, theta, psi = state.euler
-    rotation = rotation_from_euler(phi, theta, psi)
-    return (
-        control_point(state.position, rotation, ell),
-        control_point_velocity(rotation, state.nu, ell),
-    )

@@ -29,7 +29,6 @@ FASTEST = 10.0
 #: Largest rate of turn [rad/s].
 FASTEST_TURN = 30.0
 
-
 #: Rudder, stern planes and propeller, as commands and as states.
 ACTUATOR: Members = {"delta_r": "rad", "delta_s": "rad", "n": "rad/s"}
 

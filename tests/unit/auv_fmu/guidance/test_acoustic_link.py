@@ -9,8 +9,9 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from auv_fmu import Refusal
 from auv_fmu.guidance import acoustic_link
-from auv_fmu.guidance.acoustic_link import PLACES, BadLink, LinkState, Parameters
+from auv_fmu.guidance.acoustic_link import PLACES, LinkState, Parameters
 from auv_fmu.language.random_numbers import start, uniform
 
 HERE, LEVEL = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
@@ -164,10 +165,10 @@ def test_zero_step_changes_nothing():
 
 
 def test_what_no_link_can_do_is_refused():
-    with pytest.raises(BadLink, match="16 would be under way; raise period or reduce latency"):
+    with pytest.raises(Refusal, match="16 would be under way; raise period or reduce latency"):
         acoustic_link.check(Parameters(period=0.1, latency=1.7))
     acoustic_link.check(Parameters(period=0.1, latency=1.6))
     parameters = Parameters(period=0.01)
     state: LinkState = acoustic_link.first_state(parameters, HERE, LEVEL, 0.0)
-    with pytest.raises(BadLink, match="a step of 200 s has more than 10000 messages"):
+    with pytest.raises(Refusal, match="a step of 200 s has more than 10000 messages"):
         acoustic_link.advance(parameters, state, HERE, LEVEL, HERE, 0.0, 200.0)

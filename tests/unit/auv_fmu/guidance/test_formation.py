@@ -11,13 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_fmu import Refusal
 from auv_fmu.guidance import formation
-from auv_fmu.guidance.follower import Follower, ImpossiblePath
+from auv_fmu.guidance.follower import Follower
 from auv_fmu.guidance.formation import (
     Estimator,
     FormationState,
     Heading,
-    ImpossibleFormation,
     Known,
     Parameters,
     Shape,
@@ -276,15 +276,15 @@ def test_vehicle_points_along_its_reference_and_at_rest_with_the_formation():
 )  # fmt: skip
 def test_changes_that_no_vehicle_can_follow_are_refused(stages, why):
     shapes = {"n": 2, "shape": (Shape.LINE, Shape.COLUMN, Shape.LINE, Shape.LINE)}
-    with pytest.raises(ImpossibleFormation) as refused:
+    with pytest.raises(Refusal) as refused:
         formation.check(DEFAULT._replace(stages=Stages()._replace(**{**shapes, **stages})))
     assert str(refused.value).startswith(why)
 
 
 def test_other_parameters_that_do_not_fit_are_refused():
-    with pytest.raises(ImpossibleFormation, match="number is 4, and there are 3 vehicles"):
+    with pytest.raises(Refusal, match="number is 4, and there are 3 vehicles"):
         formation.check(DEFAULT._replace(number=4))
-    with pytest.raises(ImpossiblePath, match="d22 and d33 must be positive"):
+    with pytest.raises(Refusal, match="d22 and d33 must be positive"):
         formation.check(DEFAULT._replace(follower=Follower(Vehicle(d22=0.0))))
     formation.check(DEFAULT)
 
@@ -305,7 +305,7 @@ def test_other_parameters_that_do_not_fit_are_refused():
     ],
 )
 def test_leader_that_is_too_quick_is_refused(leader, why):
-    with pytest.raises(ImpossiblePath) as refused:
+    with pytest.raises(Refusal) as refused:
         formation.reference(DEFAULT, formation.first_state(leader), leader, 0.0)
     assert why in str(refused.value)
     estimated = DEFAULT._replace(estimated=True)

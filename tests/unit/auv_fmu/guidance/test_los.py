@@ -15,8 +15,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from auv_fmu import Refusal
 from auv_fmu.guidance import los
-from auv_fmu.guidance.follower import ImpossiblePath
 from auv_fmu.guidance.los import Angle, Law, Leg, Parameters, State, ssa
 from auv_fmu.guidance.path_planner import MOST
 
@@ -200,7 +200,7 @@ def test_last_leg_continues_on_level():
     ],
 )
 def test_impossible_paths_are_refused(points, why):
-    with pytest.raises(ImpossiblePath, match=why):
+    with pytest.raises(Refusal, match=why):
         los.check(path(points), 3.0)
 
 

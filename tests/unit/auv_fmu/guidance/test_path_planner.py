@@ -10,8 +10,9 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from auv_fmu import Refusal
 from auv_fmu.guidance import path_planner
-from auv_fmu.guidance.follower import Follower, ImpossiblePath, demand, posture
+from auv_fmu.guidance.follower import Follower, demand, posture
 from auv_fmu.guidance.path_planner import MOST, Parameters, Waypoints, check
 from auv_fmu.paper import motion_planner
 from auv_fmu.paper.actuators import Limits
@@ -224,14 +225,14 @@ UP_80 = (10, 0, 10 * tan(radians(80.0)))
     ],
 )  # fmt: skip
 def test_path_that_cannot_be_followed_is_refused_where_it_cannot(changes, message):
-    with pytest.raises(ImpossiblePath, match=message):
+    with pytest.raises(Refusal, match=message):
         check(Parameters(**changes))
 
 
 def is_too_steep(waypoints: Waypoints) -> bool:
     try:
         path_planner._check_pitch(waypoints)
-    except ImpossiblePath as error:
+    except Refusal as error:
         assume("climbs or dives" in str(error))  # or it turns back
         return True
     return False
@@ -328,7 +329,7 @@ def test_path_is_let_pass_up_to_each_limit_of_3(axis, k, sign):
 
     check(limited(most * 1.01 + 1e-9))
     if most > 1e-6:
-        with pytest.raises(ImpossiblePath, match=r"near waypoint \d"):
+        with pytest.raises(Refusal, match=r"near waypoint \d"):
             check(limited(most * 0.99))
 
 

@@ -11,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from auv_fmu import Refusal
 from auv_fmu.guidance import track
-from auv_fmu.guidance.follower import Follower, ImpossiblePath
+from auv_fmu.guidance.follower import Follower
 from auv_fmu.guidance.track import Row
 
 #: Position and velocity over time.
@@ -91,7 +92,7 @@ def test_reference_rests_outside_of_the_rows():
     ],
 )
 def test_track_that_cannot_be_followed_is_refused_when_it_cannot(motion, why):
-    with pytest.raises(ImpossiblePath, match=f"^a.csv: at .*{why}"):
+    with pytest.raises(Refusal, match=f"^a.csv: at .*{why}"):
         check(motion, *np.linspace(0.0, 6.0, 61))
 
 
@@ -100,7 +101,7 @@ def test_way_straight_back_is_refused_without_a_rest(rows_apart):
     """Close and far rows give the same answer; the path is slower than 0.1 m/s from 8 s to 12 s."""
     back = straight(1.0, 0.2, lambda t: (0.5 * t - 0.025 * t * t, 0.5 - 0.05 * t))
     times = np.arange(0.0, 20.0 + rows_apart / 2, rows_apart)
-    with pytest.raises(ImpossiblePath, match=r"at t = 12\.?\d* s, .* straight back"):
+    with pytest.raises(Refusal, match=r"at t = 12\.?\d* s, .* straight back"):
         check(back, *times)
 
     def rested(t: float):

@@ -9,9 +9,10 @@ import pytest
 from scipy.spatial.transform import Rotation as Turn
 from scipy.stats import chi2
 
+from auv_fmu import Refusal
 from auv_fmu.language.arrays import Vector
 from auv_fmu.navigation import sampling, sensors
-from auv_fmu.navigation.sampling import WIDTH, BadSampling, Errors, Sampling
+from auv_fmu.navigation.sampling import WIDTH, Errors, Sampling
 from fmus.depth_sensor import component as depth
 from fmus.imu import component as imu
 
@@ -38,7 +39,7 @@ def samples(parameters: Sampling, h: float, n: int, errors: Errors = NONE, start
 @pytest.mark.parametrize("delay", [0.0, 0.013, 0.3])
 def test_samples_follow_a_list_of_events(period, h, delay):
     if delay > 16 * period:
-        with pytest.raises(BadSampling, match="raise period"):
+        with pytest.raises(Refusal, match="raise period"):
             sampling.check(Sampling(period, delay))
         return
     times = [3.0 + k * h for k in range(400)]
@@ -156,7 +157,7 @@ def test_noise_of_an_imu_is_its_density_at_any_rate():
 
 def test_component_refuses_a_delay_of_too_many_periods():
     parameters = sensors.DepthSensor(Sampling(0.1, 1.7))
-    with pytest.raises(BadSampling, match="16 would be under way"):
+    with pytest.raises(Refusal, match="16 would be under way"):
         depth.check(parameters)
 
 

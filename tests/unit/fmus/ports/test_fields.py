@@ -199,6 +199,8 @@ def test_outputs_depend_on_what_is_said_or_else_on_what_all_do():
         ("input", Annotated[Vector, 3, Variable(members=("x", "y"))], "has 2 members for 3 number"),
         ("input", Annotated[float, Variable(members=("x",))], "has 1 members for one numbers"),
         ("input", Annotated[float, Variable(tunable=True)], "is no parameter, and tunable is for "),
+        ("output", Annotated[float, Variable(terminal="y")], "is no input, and terminal is for "),
+        ("input", Annotated[float, Variable(terminal="a b")], "has the terminal 'a b'; write a"),
         ("input", Annotated[float, Variable(feedthrough=())], "is no output, and feedthrough is f"),
         ("output", Annotated[float, Variable(feedthrough="u")], "has the feedthrough 'u'; write a"),
         ("output", Annotated[float, Variable(minimum=0.0)], "is an output; minimum and maximum ar"),

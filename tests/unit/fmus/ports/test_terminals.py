@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated, NamedTuple
 from xml.etree import ElementTree
 
+from auv_fmu import Variable, Vector
+from fmus.ports.fields import declared
 from fmus.ports.port import Port
 from fmus.ports.terminals import terminals_of
 
@@ -38,6 +41,16 @@ def test_only_groups_of_inputs_and_outputs_are_terminals():
         ("y", "plug", [("y.x", "x", "signal")]),
         ("theta", "bus", [("theta[1]", "1", "signal"), ("theta[2]", "2", "signal")]),
     ]
+
+
+def test_a_terminal_has_the_name_that_an_input_declares():
+    class Inputs(NamedTuple):
+        nu: Annotated[Vector, 6, Variable("m/s", "Velocity", terminal="nu_r")]
+        y: Annotated[float, Variable("m", "Place")]
+
+    [[*nu], [*y]] = declared(Inputs, "input").values()
+    root = ElementTree.fromstring(terminals_of({"": [*nu, *y]}))
+    assert [terminal.get("name") for terminal in root.iter("Terminal")] == ["nu_r", "y"]
 
 
 def test_inputs_are_on_the_left_and_outputs_on_the_right_of_the_icon():

@@ -8,7 +8,7 @@ from pythonfmu.enums import Fmi2Status
 from auv_fmu import Refusal
 from auv_fmu.remus import remus100
 from auv_fmu.remus.prestero import Coefficients
-from auv_fmu.remus.remus100 import Form, Parameters, TooFast
+from auv_fmu.remus.remus100 import Form, Parameters
 from fmus.remus100.component import check, check_state
 from support.instances import ClassInstance
 
@@ -70,5 +70,5 @@ def test_state_with_an_actuator_beyond_its_limit_is_refused(actuator):
 
 def test_state_beyond_the_model_is_refused():
     state = remus100.begin(Parameters(), (0.0, 0.0, 0.0))
-    with pytest.raises(TooFast):
+    with pytest.raises(Refusal):
         check_state(Parameters(), state._replace(nu=(11.0, 0.0, 0.0, 0.0, 0.0, 0.0)))

@@ -234,20 +234,35 @@ def test_an_unknown_figure_is_refused_with_a_hint():
         check_figure("none")
 
 
-def test_waypoints_are_in_the_path():
+def with_waypoints(points):
+    """A run with waypoints, and the one after the last that counts."""
     table = loop_table()
-    points = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])
-    known = {PortName.read("planner.count"): 2} | {
+    known = {PortName.read("planner.count"): len(points)} | {
         PortName.read(f"planner.waypoint[{k}].{axis}"): value
         for k, point in enumerate([*points, [9.0, 9.0, 9.0]], start=1)
         for axis, value in zip("xyz", point, strict=True)
     }
     header = replace(table.header, parameters={**table.parameters, **known})
-    run = Drawn("run", Table.of(header, table.rows))
-    figure, _ = compose("", FIGURES["tracking"][""], [run])
+    return Drawn("run", Table.of(header, table.rows))
+
+
+def test_waypoints_are_in_the_path():
+    points = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 3.0]])
+    figure, _ = compose("", FIGURES["tracking"][""], [with_waypoints(points)])
     [axes] = [axes for axes in figure.axes if axes.name == "3d"]
     [marks] = [marks for marks in axes.collections if marks.get_label() == "waypoints"]
     np.testing.assert_array_equal(np.column_stack(marks._offsets3d), points)
+
+
+def test_names_of_a_flat_path_are_on_the_page_below_five_entries_of_its_legend():
+    run = with_waypoints([(0.0, 0.0, 0.0), (150.0, 0.0, 8.0), (150.0, 120.0, 8.0)])
+    figure = one_figure("tracking", "", [run])
+    FigureCanvasAgg(figure).draw()
+    [axes] = [axes for axes in figure.axes if axes.name == "3d"]
+    assert len(axes.get_legend().get_texts()) == 5
+    assert [text.get_text() for text in axes.texts] == ["x north [m]", "y east [m]", "z down [m]"]
+    for text in axes.texts:
+        assert figure.bbox.count_contains(text.get_window_extent().corners()) == 4
 
 
 # Figures for a paper

@@ -28,14 +28,18 @@ from orchestrator.program import functions
 from orchestrator.runs.scenario import SCENARIOS_FOLDER
 from support import examples
 from support.settings import NAMES
+from support.tiers import slow
 
 casadi = pytest.importorskip("casadi")
 
 FIG4 = SCENARIOS_FOLDER / "fig4.toml"
 
 #: Loops that end where a number says so cannot be unrolled.
-LOOPS = {"AcousticLink", "NavigationFilter", "Sea", "lqr", "stair"}
-ALL = [name for name in (*NAMES, *examples.NAMES) if name not in LOOPS]
+LOOPS = {"AcousticLink", "Sea", "lqr", "stair"}
+SMALL = [name for name in (*NAMES, *examples.NAMES) if name not in {*LOOPS, "NavigationFilter"}]
+
+#: With one of 188,672 operations.
+ALL = [*SMALL, *slow("NavigationFilter")]
 
 #: Components that draw random numbers in a step, which jump with the state of their generator.
 SENSORS = {"AttitudeSensor", "DepthSensor", "Dvl", "Imu", "PositionFix"}
@@ -172,7 +176,7 @@ def is_smooth(port: Port, value: float) -> bool:
     return port.type == "Real" and value not in (port.minimum, port.maximum)
 
 
-@pytest.mark.parametrize("name", [name for name in ALL if name not in SENSORS])
+@pytest.mark.parametrize("name", [name for name in SMALL if name not in SENSORS])
 def test_derivatives_agree_with_central_differences(name):
     step, made = some(name)[-1], model(name)
     definition = source(name).definition
