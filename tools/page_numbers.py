@@ -5,8 +5,8 @@
 `noise`        effect of 1 mm of noise: README, reproduction.md, and remarks of scenarios
 `seeds`        effect of random seas, links and noise: remarks of scenarios, and their pages
 `guidance`     docs/explanation/guidance.md: errors across the path with each law, over seeds
-`remus`        docs/explanation/remus.md: changes of `remus` and `remus-pd`, and steady turns
-`bluerov`      docs/explanation/bluerov2.md: changes of `bluerov` and `bluerov-pd`, steady speeds
+`remus`        docs/explanation/remus.md: changes of `remus` over seeds, and steady turns
+`bluerov`      docs/explanation/bluerov2.md: changes of `bluerov` over seeds, and steady speeds
 `networks`     docs/tutorials/your-own-component.md: deviation of networks from onnxruntime
 `gains`        the best gains under a limit of the commands, in docs/explanation/ready-studies.md
 `roundings`    docs/explanation/batch.md: how far the indices of `batch` and `gpu` may be apart
@@ -621,6 +621,11 @@ def seed_numbers(scenario: str, made: Table, loops: Sequence[Loop]) -> dict[str,
     for i, actuator in enumerate(ACTUATORS):
         share = max(mask[:, i].mean() for mask in beyond)
         found[f"steps beyond the limits, {actuator} [%]"] = 100.0 * share
+    if scenario in GUIDED:
+        active, y_e = made["planner.active"], made["planner.y_e"]
+        for k in (2, 3):
+            leg = y_e[active == k]
+            found[f"across leg {k}, beyond it [m]"] = (-np.sign(leg[0]) * leg).max()
     if len(loops) > 1:
         found[f"{SMALLEST_DISTANCE_LABEL} [m]"] = smallest_distances(made, loops).min()
     return found
@@ -711,28 +716,44 @@ CHANGES: Mapping[str, Values] = {
 }  # fmt: skip
 
 
-def remus() -> None:
-    """Print a line for each change, for both controllers.
+#: Seeds of the noise, over which numbers of changed scenarios are medians.
+SEEDS = range(1, 11)
 
-    Its columns are the largest error in the first 40 s and from 120 s on [m], the largest part of
+
+def show_changes(
+    scenario: str,
+    columns: Sequence[str],
+    changes: Mapping[str, Values],
+    numbers_of: Callable[[Table], Sequence[float]],
+) -> None:
+    """Print the numbers of a scenario and of its PD controller with changes, over seeds."""
+    rows = []
+    for (name, values), pd in combinations(changes.items(), ("", "-pd")):
+        lacking = ("controller.K2", "controller.k_d") if pd else ()
+        shared = {key: value for key, value in values.items() if key not in lacking}
+        system, end = system_of(scenario + pd), read_scenario(scenario).stop_time
+        made = (simulate(system, {**shared, SEED: k}, stop_time=end) for k in SEEDS)
+        found = np.array([numbers_of(result) for result in made])
+        rows.append([name, "PD" if pd else "proposed", *map(band, found.T)])
+    show(["changed", "controller", *columns], rows)
+
+
+def remus() -> None:
+    """Print the numbers with each change, for both controllers, and of the models.
+
+    The columns are the largest error in the first 40 s and from 120 s on [m], the largest part of
     the latter across the path [m], the share of steps with a fin at its limit, in pitch and yaw
-    [%], the largest command in yaw [N.m], and the mean rate of the rudder [degrees/s]. Then the
-    models: masses, steady turns, trims and corners.
+    [%], the largest command in yaw [N.m], and the mean rate of the rudder [degrees/s]. The models
+    have masses, steady turns, trims and corners.
     """
-    heading = f"{'first':>6}{'late':>6}{'across':>6}{'q':>4}{'r':>4}{'yaw':>7}{'rate':>6}"
-    print(f"{'changed':42}{heading}  |{heading}")
+    columns = ("first", "late", "across", "q", "r", "yaw", "rate")
     prestero = {
         str(name): value
         for name, value in read_scenario("remus-prestero").parameters.items()
         if name.component != "controller" and "waypoint" not in name.port
     }
-    for name, changes in {**CHANGES, "Prestero's coefficients": prestero}.items():
-        lacking = ("controller.K2", "controller.k_d")
-        shared = {key: value for key, value in changes.items() if key not in lacking}
-        lines = remus_numbers("remus", changes), remus_numbers("remus-pd", shared)
-        print(f"{name:42}{'  |'.join(lines)}", flush=True)
-    own = (remus_numbers(f"remus-prestero{pd}", {}, 50.0) for pd in ("", "-pd"))
-    print(f"{'remus-prestero, late from 50 s':42}{'  |'.join(own)}")
+    changes = {**CHANGES, "Prestero's coefficients": prestero}
+    show_changes("remus", columns, changes, remus_numbers)
     for scenario in ("remus", "remus-pd"):
         result = simulate(scenario, stop_time=1500.0)
         size, time = size_of(result, AllocatedLoop()), result.time
@@ -742,22 +763,18 @@ def remus() -> None:
     models()
 
 
-def remus_numbers(scenario: str, changes: Values, late_from: float = 120.0) -> str:
-    """Numbers of a run in a line."""
-    result = simulate(system_of(scenario), changes, stop_time=280.0)
-    if result.failure is not None:
-        return result.failure
-    loop, late = AllocatedLoop(), result.time >= late_from
+def remus_numbers(result: Table) -> Sequence[float]:
+    """Numbers of a run."""
+    loop, late = AllocatedLoop(), result.time >= 120.0
     size, across = size_of(result, loop), beside(result, loop)[late].max()
     pairs = ((f"controller.tau.{k}", f"allocation.tau_attained.{k}") for k in "qr")
-    pitch, yaw = (
+    limited = (
         100.0 * (np.abs(np.subtract(*result.step_values(*pair).T)) > 1e-9).mean() for pair in pairs
     )
     command = np.abs(result.step_values("controller.tau.r")).max()
     rate = np.abs(np.diff(np.degrees(result["plant.actuator.delta_r"]))).sum() / result.time[-1]
     first = size[result.time < 40.0].max()
-    largest = f"{first:6.2f}{size[late].max():6.3f}{across:6.3f}"
-    return f"{largest}{pitch:4.0f}{yaw:4.0f}{command:7.1f}{rate:6.0f}"
+    return (first, size[late].max(), across, *limited, command, rate)
 
 
 def prestero_vehicle() -> remus100.Parameters:
@@ -944,7 +961,7 @@ ROV_CHANGES: Mapping[str, Values] = {
 
 
 def bluerov() -> None:
-    """Print a line for each change, for both controllers, and steady speeds.
+    """Print the numbers with each change, for both controllers, and steady speeds.
 
     The columns are the largest error in the first 20 s, from 20 s to 50 s and from 65 s on [m], the
     part of the second across the path [m], the share of steps in which a thruster is at its limit
@@ -952,13 +969,7 @@ def bluerov() -> None:
     in the mean of the eight [1/s].
     """
     columns = ("first", "later", "across", "end", "limit", "roll", "pitch", "moves")
-    heading = "".join(f"{column:>7}" for column in columns)
-    print(f"{'changed':41}{heading}  |{heading}")
-    for name, changes in ROV_CHANGES.items():
-        lacking = ("controller.K2", "controller.k_d")
-        shared = {key: value for key, value in changes.items() if key not in lacking}
-        lines = bluerov_numbers("bluerov", changes), bluerov_numbers("bluerov-pd", shared)
-        print(f"{name:41}{'  |'.join(lines)}", flush=True)
+    show_changes("bluerov", columns, ROV_CHANGES, bluerov_numbers)
     derived = thruster_allocation.derive(Parameters())
     water = bluerov2.Hydrodynamics()
     wu = (4.03, 18.18), (6.22, 21.66), (5.18, 36.99)
@@ -977,11 +988,8 @@ def steady_speed(linear: float, quadratic: float, force: float) -> float:
     return (sqrt(linear**2 + 4.0 * quadratic * force) - linear) / (2.0 * quadratic)
 
 
-def bluerov_numbers(scenario: str, changes: Values) -> str:
-    """Numbers of a run in a line."""
-    result = simulate(scenario, changes)
-    if result.failure is not None:
-        return result.failure
+def bluerov_numbers(result: Table) -> Sequence[float]:
+    """Numbers of a run."""
     loop, time = AllocatedLoop(), result.time
     size, later = size_of(result, loop), (time >= 20.0) & (time <= 50.0)
     commands = result.step_values(*(f"allocation.command[{k}]" for k in range(1, 9)))
@@ -989,8 +997,7 @@ def bluerov_numbers(scenario: str, changes: Values) -> str:
     moves = np.abs(np.diff(commands, axis=0)).sum(axis=0).mean() / time[-1]
     roll, pitch = (np.degrees(np.abs(result[f"plant.eta.{k}"]).max()) for k in ("phi", "theta"))
     errors = (size[time < 20.0], size[later], beside(result, loop)[later], size[time >= 65.0])
-    largest = "".join(f"{error.max():7.3f}" for error in errors)
-    return f"{largest}{limited:7.1f}{roll:7.1f}{pitch:7.1f}{moves:7.2f}"
+    return (*(error.max() for error in errors), limited, roll, pitch, moves)
 
 
 def beside(made: Table, loop: Loop) -> np.ndarray:

@@ -11,8 +11,8 @@ the other forces. If these are constant, the energy of errors and estimate canno
     V = k_1 k_2 z_1'z_1 / 2 + z_2'z_2 / 2 + (w - w*)'(w - w*) / (2 gamma)
     dV/dt = -k_1^2 k_2 z_1'z_1 - k_2 z_2'z_2
 
-See Krstić, Kanellakopoulos and Kokotović, Nonlinear and Adaptive Control Design (1995), chapter 3,
-and Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control (2011), section 13.3.
+See Krstić, Kanellakopoulos and Kokotović, Nonlinear and Adaptive Control Design (1995), and Fossen,
+Handbook of Marine Craft Hydrodynamics and Motion Control (2011). The former weigh z_1'z_1 with one.
 
 The law measures dy. Along an axis of the body whose force is at its limit, w does not grow. With
 the default inputs the force rises to the limit.

@@ -8,9 +8,13 @@
 
 M and D are mass and drag at the control point (`auv_fmu.paper.point_mass`), and Theta has a row for
 each axis of the body. s is R' x'P B for the error x of the model, with A'P + P A = -2 zeta omega
-diag(omega^2, 1). For a constant Theta* and without sigma, V = x'P x + |Theta - Theta*|^2 / gamma
-does not rise: Lavretsky and Wise, Robust and Adaptive Control (2013), chapter 9. With noise, sigma
-keeps Theta bounded (chapter 11). An axis at its limit does not adapt. The law measures dy.
+diag(omega^2, 1). With the true masses M*, a constant Theta* and without sigma, V does not rise:
+
+    V = x'P x + sum over the axes of M / M* |Theta - Theta*|^2 / gamma
+
+See Lavretsky and Wise, Robust and Adaptive Control with Aerospace Applications (2013), chapter 9.
+With noise, sigma keeps Theta bounded (chapter 11). An axis at its limit does not adapt. The law
+measures dy.
 """
 
 from __future__ import annotations

@@ -5,13 +5,13 @@
 
 Only y gives s: dy / (1 + T_f p) = (y - y_f) / T_f with T_f dy_f/dt = y - y_f. The gains place
 the poles of a mass M with drag D (`auv_fmu.paper.point_mass`), as in Fossen, Handbook of Marine
-Craft Hydrodynamics and Motion Control, 2021, section 15.3:
+Craft Hydrodynamics and Motion Control, 2021, section 15.3.4:
 
     K_p = omega^2 M,  K_d = 2 zeta omega M - D but not below 0,  T_i = 10 / omega
 
 Along an axis whose force is at its limit, the integral does not grow further: it does not wind up
-(conditional integration, Åström and Hägglund, PID Controllers, 1995, section 3.5). With the default
-inputs the vehicle does not move, and the integral rises to the limit.
+(conditional integration; Åström and Hägglund, PID Controllers: Theory, Design, and Tuning, 1995).
+With the default inputs the vehicle does not move, and the integral rises to the limit.
 """
 
 from __future__ import annotations

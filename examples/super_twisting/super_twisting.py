@@ -5,11 +5,12 @@
     F = M a + D dy, limited to what tau_max allows
 
 M and D are mass and drag at the control point (`auv_fmu.paper.point_mass`). The rest of the forces
-is a disturbance w [m/s2] of ds/dt = -k_1 |s|^(1/2) sign(s) + v + w. If |dw/dt| < L, s reaches zero
-in finite time, and stays there: Levant, Sliding order and sliding accuracy in sliding mode control,
-International Journal of Control 58 (1993); Moreno and Osorio, Strict Lyapunov functions for the
-super-twisting algorithm, IEEE Transactions on Automatic Control 57 (2012). Usual gains are
-k_1 = 1.5 L^(1/2) and k_2 = 1.1 L (Shtessel et al., Sliding Mode Control and Observation, 2014).
+is a disturbance w [m/s2] of ds/dt = -k_1 |s|^(1/2) sign(s) + v + w. If |dw/dt| < L, and the gains
+are large enough for L, s reaches zero in finite time, and stays there: Levant, Sliding order and
+sliding accuracy in sliding mode control, International Journal of Control 58 (1993); Moreno and
+Osorio, Strict Lyapunov functions for the super-twisting algorithm, IEEE Transactions on Automatic
+Control 57 (2012). Usual gains are k_1 = 1.5 L^(1/2) and k_2 = 1.1 L (Shtessel et al., Sliding Mode
+Control and Observation, 2014).
 
 The law measures dy, and acts on each component of s in the earth frame. Along an axis of the body
 whose force is at its limit, v does not grow. With the default inputs it rises to the limit.

@@ -26,10 +26,11 @@ from orchestrator.runs.bundle import current_fmus
 from orchestrator.runs.made_components import with_fmus
 from orchestrator.runs.scenario import Scenario, read_scenario
 from orchestrator.runs.wiring import closed_loop
-from orchestrator.studies.batch_engine import ADVICE
+from orchestrator.studies.batch_engine import ADVICE, REFUSED
+from orchestrator.studies.engine import outcomes_of
 from orchestrator.studies.store import StudyResult
-from orchestrator.studies.study import Range, Study, read_study
-from orchestrator.studies.sweep import Means, complete_study
+from orchestrator.studies.study import FMU, Range, Study, read_study
+from orchestrator.studies.sweep import Means, complete_study, prepare_study
 
 _HERE = Path(__file__).parent
 
@@ -339,6 +340,33 @@ def runs_of(
             progress,
             systems={study.name: loop_of(law, vehicle, gains)},
         )
+
+
+def refusal_in(
+    result: StudyResult, law: Law, vehicle: Vehicle, n: int, gains: Mapping[str, float]
+) -> str:
+    """Return a line on the runs that were refused, with the reason of the first; empty if none.
+
+    Args:
+        result: the runs.
+        law, vehicle, n, gains: of :func:`runs_of`.
+
+    """
+    refused = result["run"][result["failure"] == REFUSED]
+    if not len(refused):
+        return ""
+    study = study_of_law(law, vehicle, n)
+    # Only FMUs give a reason.
+    ready = prepare_study(
+        study,
+        Means(engine=FMU, kind=PYTHON),
+        given={study.name: loop_of(law, vehicle, gains)},
+    )
+    [outcome] = outcomes_of(ready.engine, ready.space.points(refused[:1]))
+    return (
+        f"{law.component}: {len(refused)} of {result.runs} runs with {vehicle.name} were refused; "
+        f"the first: {outcome.failure}"
+    )
 
 
 @contextmanager

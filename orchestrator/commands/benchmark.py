@@ -12,10 +12,11 @@ from orchestrator.benchmark.contest import (
     OWN_GAINS,
     Law,
     Vehicle,
-    component_of,
     law_of,
     laws,
+    members,
     read_gains,
+    refusal_in,
     runs_of,
     vehicles,
 )
@@ -101,11 +102,11 @@ def _benchmark(options: argparse.Namespace) -> int:
     if choice.task is not None:
         _chosen("task", choice.task, dict.fromkeys(tasks))
     for law in entered.values():
-        component_of(law)
+        members(law, dict.fromkeys(law.gains, 1.0))
     tuned = (own or entered) if choice.tune else {}
     try:
         gains = _gains(entered, tuned, on, options)
-        made = _made(entered, on, gains, options)
+        made = _made(entered, own, on, gains, options)
     except KeyboardInterrupt:
         say(f"interrupted; {options.out} keeps the finished runs: the same command continues there")
         return INTERRUPTED
@@ -162,30 +163,23 @@ def _gains(
 
 def _made(
     entered: dict[str, Law],
+    own: dict[str, Law],
     on: dict[str, Vehicle],
     gains: dict[str, dict[str, dict[str, float]]],
     options: argparse.Namespace,
 ) -> Made:
-    """Make the missing runs, and return all."""
-    means = Means(workers=options.workers, force=options.force)
-    return {
-        (law.name, vehicle.name): runs_in(
-            runs_of(
-                law,
-                vehicle,
-                options.runs,
-                gains[vehicle.name][law.name],
-                options.out,
-                options.command,
-                means,
-                say,
-                progress=True,
-            ),
-            vehicle.tasks,
-        )
-        for vehicle in on.values()
-        for law in entered.values()
-    }
+    """Make the missing runs, and return all; say why runs of the user's own laws are refused."""
+    means, made = Means(workers=options.workers, force=options.force), {}
+    for vehicle in on.values():
+        for law in entered.values():
+            values, out = gains[vehicle.name][law.name], options.out
+            found = runs_of(
+                law, vehicle, options.runs, values, out, options.command, means, say, progress=True
+            )
+            if law.name in own and (why := refusal_in(found, law, vehicle, options.runs, values)):
+                say(why)
+            made[law.name, vehicle.name] = runs_in(found, vehicle.tasks)
+    return made
 
 
 def _publish(

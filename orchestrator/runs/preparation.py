@@ -59,7 +59,7 @@ from orchestrator.runs.scenario import (
     shared_events,
 )
 from orchestrator.runs.wiring import check_built, closed_loop, read_wiring
-from orchestrator.vehicle.cautions import differing_vehicle
+from orchestrator.vehicle.cautions import differing_vehicle, samples_too_old
 from orchestrator.vehicle.signals import Loop, loops_of
 
 T = TypeVar("T")
@@ -273,7 +273,8 @@ def doubts_of(system: System, given: Collection[PortName] = ()) -> list[str]:
     if len(system.components) == 1:
         # No other component could feed it.
         return turns
-    return [*filter(None, (system.unfed_inputs(given), differing_vehicle(system))), *turns]
+    found = system.unfed_inputs(given), differing_vehicle(system), samples_too_old(system)
+    return [*filter(None, found), *turns]
 
 
 def _turns(system: System) -> list[str]:

@@ -196,6 +196,27 @@ def _differing(system: System, loop: Loop) -> str | None:
     return f"{'; '.join(texts)}: {' and '.join(sorted(others))} {made} set for another vehicle"
 
 
+def samples_too_old(system: System) -> str | None:
+    """Report sensors whose samples arrive later than a filter uses them.
+
+    Returns:
+        One line; None if there are none.
+
+    """
+    texts = []
+    for wire in system.connections:
+        if wire.target.port.endswith(".age"):
+            user = wire.target.component
+            delay, most = PortName(wire.source.component, "delay"), PortName(user, "delay_max")
+            age, limit = (_real_parameter(system, name) for name in (delay, most))
+            if age is not None and limit is not None and age > limit:
+                texts.append(
+                    f"{delay} = {age:.12g}, but {most} = {limit:.12g}: {user} ignores these "
+                    f"samples; raise {most}"
+                )
+    return "; ".join(texts) or None
+
+
 def _real_parameter(system: System, name: PortName) -> float | None:
     """Return the value of a Real parameter; None if there is none of the name."""
     if not system.has(name):

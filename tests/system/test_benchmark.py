@@ -371,6 +371,30 @@ def test_a_law_of_the_users_own_enters_the_table(mine: Path, capsys, monkeypatch
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ('raise Refusal("too near")', "too near"),
+        ('raise ValueError("too near")', "my_law.py:37: ValueError: too near"),
+        ("e = nan * e", "tau.u = nan: must be finite"),
+    ],
+)
+def test_runs_that_a_law_ends_are_counted_with_a_reason(mine: Path, capsys, line, why):
+    """Each time, though no run is made again."""
+    law = LAW.replace("import Variable", "import Refusal, Variable").replace(
+        "    return", f"    if e[0] * e[0] < 1.0:\n        {line}\n    return"
+    )
+    mine.write_text(law.replace("from typing", "from math import nan\nfrom typing", 1))
+    for _ in range(2):
+        assert main(COMMAND) == 0
+        [error] = [line for line in capsys.readouterr().err.splitlines() if "refused;" in line]
+        assert error.startswith("auv-fmu: my_law.py: 12 of 12 runs with auv were refused; the ")
+        assert error.endswith(f"controller: outputs refused: {why}") or error.endswith(
+            f"controller: initialisation refused: {why}"
+        )
+
+
+@pytest.mark.slow
 def test_its_gains_are_searched_once(mine: Path, capsys):
     search = [*COMMAND, "--tune", "--candidates", "5"]
     assert main(search) == 0
@@ -390,6 +414,7 @@ def test_its_gains_are_searched_once(mine: Path, capsys):
         ("(1.0, 100.0)", "range(2)", "GAINS 0 < low < high"),
         ("def outputs(", "def outputs((", "my_law.py line 32"),
         *slow(
+            ('{"k"', '{"kk"', "GAINS there is no parameter kk did you mean k"),
             ("tau: Annotated", "force: Annotated", "no output tau.u a law has tau.u, tau.q, tau.r"),
             ("y_d", "wind", "input wind.x is unknown y, eta, dy, y_d"),
             ("    return Outputs", "    x = [1.0]\n    return Outputs", "my_law.py a list is not"),

@@ -254,6 +254,30 @@ def test_another_vehicle_in_some_components_is_named(workplace, capsys, values):
     assert main(["run", "auv.toml", "--no-figures", "--strict"]) == (2 if info else 0)
 
 
+_DELAYED = """
+[components]
+dvl = "Dvl"
+filter = "NavigationFilter"
+[wires]
+"dvl.nu" = "plant.nu"
+"filter.dvl" = "dvl.sample"
+[parameters]
+dvl.delay = {}
+"""
+
+
+def test_samples_that_a_filter_ignores_are_named(workplace, capsys):
+    """They are older than its delay_max, 1 s."""
+    for delay in ("1.0", "1.5"):
+        Path("auv.toml").write_text(_DELAYED.format(delay))
+        assert main(["check", "auv.toml"]) == 0
+        wrong = (
+            "info: dvl.delay = 1.5, but filter.delay_max = 1: filter ignores these samples; raise "
+            "filter.delay_max"
+        )
+        assert (wrong in lines(capsys)) == (delay == "1.5")
+
+
 @pytest.mark.parametrize("name", names())
 def test_nothing_is_open_in_a_ready_scenario(name):
     prepared = prepare(*load_scenario(name), Request(strict=True))
