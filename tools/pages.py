@@ -111,7 +111,7 @@ _GROUPS = {
         "mrac": "sampled, matrix as state, a state as rate",
         "pd_plus": "sampled, no state, groups of parameters",
         "pid_law": "sampled, filter memory, `derive`",
-        "predictive": "sampled, matrices as constants, optimisation",
+        "predictive": "sampled, optimisation, slices, `break`",
         "super_twisting": "sampled, `copysign`, a name for a type",
     },
     "estimators": {

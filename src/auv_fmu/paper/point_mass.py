@@ -60,9 +60,36 @@ class Inputs(NamedTuple):
     ddy_d: Annotated[Vector, 3, Variable(ACCELERATION, "Desired acceleration")] = ZERO
 
 
+class Outputs(NamedTuple):
+    """The command."""
+
+    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments")]
+
+
 def axes(euler: Vector3) -> Annotated[Matrix, 3, 3]:
     """R^T of the attitude (phi, theta, psi) [rad]: its rows are the axes of the body."""
     return Matrix(rotation_from_euler(*euler))
+
+
+def turn(point: PointMass, v: Triple) -> Triple:
+    """Rate [rad/s] of a body that follows its control point at v [m/s]: e_1 x v / ell."""
+    return Vector((0.0, -v[2], v[1])) / point.ell
+
+
+def turned(R_T: Annotated[Matrix, 3, 3], angle: Triple) -> Annotated[Matrix, 3, 3]:
+    """Axes that have turned about themselves, by Cayley's map: by 2 atan(|angle| / 2) [rad]."""
+    half = crossed(angle / 2.0)
+    return R_T - (half @ (R_T - half @ R_T)) * (2.0 / (1.0 + angle @ angle / 4.0))
+
+
+def by_angle(by_axes: Triple, angle: Triple) -> Triple:
+    """Gradient by the angle of :func:`turned`, from the one by a small turn of the axes."""
+    return (by_axes - crossed(angle) @ by_axes / 2.0) / (1.0 + angle @ angle / 4.0)
+
+
+def crossed(a: Triple) -> Annotated[Matrix, 3, 3]:
+    """S(a), the matrix of the cross product: S(a) b = a x b."""
+    return Matrix(((0.0, -a[2], a[1]), (a[2], 0.0, -a[0]), (-a[1], a[0], 0.0)))
 
 
 def largest(point: PointMass) -> Triple:
