@@ -20,9 +20,7 @@ from math import tanh
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Matrix, Variable, Vector
-from auv_fmu.language.quantities import TAU
-from auv_fmu.language.vectors import Vector3
-from auv_fmu.paper.point_mass import Inputs, PointMass, axes, command, limited, times
+from auv_fmu.paper.point_mass import Inputs, Outputs, PointMass, axes, command, limited, times
 
 SAMPLED = True
 STOP_TIME = 10.0
@@ -61,12 +59,6 @@ class Parameters(NamedTuple):
     point: Annotated[PointMass, Variable(name="")] = PointMass()
     W_1: Annotated[Matrix, NEURONS, 9, Variable("1", "Weight of an input")] = W_1
     W_2: Annotated[Matrix, 3, NEURONS, Variable("1", "Weight of a neuron")] = W_2
-
-
-class Outputs(NamedTuple):
-    """The command."""
-
-    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments")]
 
 
 def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:

@@ -22,9 +22,16 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Matrix, Variable, Vector
-from auv_fmu.language.quantities import TAU
-from auv_fmu.language.vectors import Vector3
-from auv_fmu.paper.point_mass import Inputs, PointMass, Triple, axes, command, limited, times
+from auv_fmu.paper.point_mass import (
+    Inputs,
+    Outputs,
+    PointMass,
+    Triple,
+    axes,
+    command,
+    limited,
+    times,
+)
 
 SAMPLED = True
 STOP_TIME = 10.0
@@ -49,12 +56,6 @@ class State(NamedTuple):
     y_m: Triple
     dy_m: Triple
     Theta: Annotated[Matrix, 3, 4]
-
-
-class Outputs(NamedTuple):
-    """The command."""
-
-    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments")]
 
 
 def start(inputs: Inputs) -> State:

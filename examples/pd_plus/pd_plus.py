@@ -22,9 +22,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Variable, Vector
-from auv_fmu.language.quantities import TAU
-from auv_fmu.language.vectors import Vector3
-from auv_fmu.paper.point_mass import Inputs, PointMass, axes, command, limited, times
+from auv_fmu.paper.point_mass import Inputs, Outputs, PointMass, axes, command, limited, times
 
 SAMPLED = True
 STOP_TIME = 10.0
@@ -39,12 +37,6 @@ class Parameters(NamedTuple):
     omega: Annotated[float, Variable("rad/s", "Frequency of the error", POSITIVE)] = 1.0
     zeta: Annotated[float, Variable("1", "Damping of the error", 0.0)] = 1.0
     point: Annotated[PointMass, Variable(name="")] = PointMass()
-
-
-class Outputs(NamedTuple):
-    """The command."""
-
-    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments")]
 
 
 def outputs(parameters: Parameters, inputs: Inputs) -> Outputs:

@@ -20,12 +20,21 @@ from math import expm1
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Variable, Vector
-from auv_fmu.language.quantities import EULER, POSITION, TAU, VELOCITY
+from auv_fmu.language.quantities import EULER, POSITION, VELOCITY
 from auv_fmu.language.vectors import Vector3
-from auv_fmu.paper.point_mass import ZERO, PointMass, Triple, axes, command, limited, times, unwound
+from auv_fmu.paper.point_mass import (
+    ZERO,
+    Outputs,
+    PointMass,
+    Triple,
+    axes,
+    command,
+    limited,
+    times,
+    unwound,
+)
 
-SAMPLED = True
-STOP_TIME = 10.0
+SAMPLED, STOP_TIME = True, 10.0
 
 #: Gains to tune, with their ranges.
 GAINS = {"omega": (0.2, 8.0), "zeta": (0.5, 2.0), "T_i": (2.0, 100.0), "T_f": (0.02, 0.5)}
@@ -56,12 +65,6 @@ class State(NamedTuple):
     i: Triple
     y_f: Triple
     dy_f: Triple
-
-
-class Outputs(NamedTuple):
-    """The command."""
-
-    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments")]
 
 
 def start(inputs: Inputs) -> State:

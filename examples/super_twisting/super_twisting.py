@@ -22,11 +22,10 @@ from math import copysign, sqrt
 from typing import Annotated, NamedTuple
 
 from auv_fmu import POSITIVE, Variable, Vector
-from auv_fmu.language.quantities import TAU
-from auv_fmu.language.vectors import Vector3
 from auv_fmu.paper.point_mass import (
     ZERO,
     Inputs,
+    Outputs,
     PointMass,
     Triple,
     axes,
@@ -59,12 +58,6 @@ class State(NamedTuple):
 
 #: The force within its limits [N], what is missing of it, both in the body frame, and s [m/s].
 Signals = tuple[Triple, Triple, Triple]
-
-
-class Outputs(NamedTuple):
-    """The command."""
-
-    tau: Annotated[Vector3, Variable(TAU, "Commanded force and moments")]
 
 
 def start() -> State:
