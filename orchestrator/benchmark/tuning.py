@@ -48,7 +48,7 @@ class Budget(NamedTuple):
 
     rounds: int = 12
     candidates: int = 32
-    draws: int = 8
+    draws: int = 16
     finalists: int = 7
     final_draws: int = 64
     seed: int = 1
