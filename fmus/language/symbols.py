@@ -52,9 +52,10 @@ _MOST_CHOICES = 1024
 #: Most turns of a `while` whose condition is a symbol; after them it must be a number.
 _MOST_TURNS = 100
 
-#: Operands that are harmless for each operation with infinite derivatives, by their places.
+#: Operands that are harmless for each operation with infinite derivatives, by their places. Small
+#: quotients cannot grow beyond all bounds in the turns of a loop that has ended.
 _HARMLESS: Mapping[str, Mapping[int, float]] = {
-    "x / y": {1: 1.0}, "int /": {1: 1.0}, "//": {1: 1.0}, "%": {1: 1.0}, "**": {0: 1.0},
+    "x / y": {1: 1e100}, "int /": {1: 1.0}, "//": {1: 1.0}, "%": {1: 1.0}, "**": {0: 1.0},
     "math.acos": {0: 0.0}, "math.acosh": {0: 2.0}, "math.asin": {0: 0.0}, "math.atan2": {1: 1.0},
     "math.atanh": {0: 0.0}, "math.cosh": {0: 0.0}, "math.exp": {0: 0.0}, "math.expm1": {0: 0.0},
     "math.fmod": {1: 1.0}, "math.log": {0: 1.0}, "math.log10": {0: 1.0}, "math.log1p": {0: 0.0},
