@@ -45,8 +45,7 @@ class Form(IntEnum):
 #: Module-level name, which Python looks up faster than a member of the class.
 COEFFICIENTS = Form.COEFFICIENTS
 
-#: At rest.
-_STILL: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+_ZERO: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 class Parameters(NamedTuple):
@@ -60,8 +59,8 @@ class Parameters(NamedTuple):
         float, Variable("s", "Time constant of the propeller", 0.0, name="propeller.T")
     ] = 1.0
     ell: Distance = ELL
-    eta0: Annotated[Vector6, Variable(ETA, "Initial posture")] = _STILL
-    nu0: Annotated[Vector6, Variable(NU, "Initial velocity in the body frame")] = _STILL
+    eta0: Annotated[Vector6, Variable(ETA, "Initial posture")] = _ZERO
+    nu0: Annotated[Vector6, Variable(NU, "Initial velocity in the body frame")] = _ZERO
     noise: Localisation = Localisation()
     current: Annotated[
         Vector3, Variable(VELOCITY, "Ocean current in the earth frame", tunable=True)
