@@ -25,6 +25,7 @@ from orchestrator.studies.space import Space
 from orchestrator.studies.study import StopTime
 from orchestrator.studies.sweep import Means, Ready, prepare_study
 from orchestrator.vehicle.signals import true_control_point
+from support.examples import EXAMPLES
 from support.texts import mentions
 from support.tiers import slow
 
@@ -32,6 +33,9 @@ pytest.importorskip("pyarrow", reason="needs the extra `studies`")
 
 COMPONENTS = Path(contest.__file__).parent / "components"
 ROOT = Path(__file__).parents[2]
+
+#: The laws of the package, which has copies of their scripts once it is installed.
+PACKAGED = laws()
 
 LAW = '''\
 """A saturated law of the position."""
@@ -87,6 +91,12 @@ def module(name: str) -> ModuleType:
     made = module_from_spec(specification)
     specification.loader.exec_module(made)
     return made
+
+
+@pytest.fixture(autouse=True)
+def scripts_of_the_examples(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Other tests load the examples, and a module of Python has one file."""
+    monkeypatch.setattr(contest, "_laws_folder", lambda: EXAMPLES)
 
 
 # Runs
@@ -314,6 +324,12 @@ def test_gains_of_the_program_are_within_the_ranges_of_its_laws():
         assert name in vehicles()
         for law, found in of_laws.items():
             assert found["gains"].keys() == known[law].gains.keys(), (name, law)
+
+
+def test_the_package_has_the_scripts_of_the_examples():
+    for name, law in laws().items():
+        if law.component.endswith(".py"):
+            assert Path(PACKAGED[name].component).read_bytes() == Path(law.component).read_bytes()
 
 
 def test_the_wheel_has_all_scripts_of_laws():
