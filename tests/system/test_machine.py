@@ -332,7 +332,8 @@ def test_children_end_with_their_parent(workplace, temporary, command, number):
 def test_a_folder_that_is_moved_away_ends_the_run_early(workplace):
     process = running()
     Path("results/fig4").rename("moved")
-    [line] = process.communicate(timeout=60)[1].splitlines()
+    # A run that came far has warned of chatter before.
+    *_, line = process.communicate(timeout=60)[1].splitlines()
     assert process.returncode == 2
     [left] = Path("moved").glob(".auv-fmu-*")
     assert line == (
