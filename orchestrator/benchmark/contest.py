@@ -30,7 +30,7 @@ from orchestrator.studies.batch_engine import ADVICE, REFUSED
 from orchestrator.studies.engine import outcomes_of
 from orchestrator.studies.store import StudyResult
 from orchestrator.studies.study import FMU, Range, Study, read_study
-from orchestrator.studies.sweep import Means, complete_study, prepare_study
+from orchestrator.studies.sweep import Means, Ready, complete_study, prepare_study
 
 _HERE = Path(__file__).parent
 
@@ -302,6 +302,20 @@ def study_of_law(law: Law, vehicle: Vehicle, n: int) -> Study:
     )
 
 
+def prepared(
+    law: Law, vehicle: Vehicle, study: Study, gains: Mapping[str, float], means: Means
+) -> Ready:
+    """Return the study of a law with a vehicle and some gains, ready for runs.
+
+    Raises:
+        InputError: the runs cannot be made.
+
+    """
+    systems = {study.name: loop_of(law, vehicle, gains)}
+    with clear_refusals(law):
+        return prepare_study(study, replace(means, kind=PYTHON), given=systems)
+
+
 def runs_of(
     law: Law,
     vehicle: Vehicle,
@@ -355,13 +369,8 @@ def refusal_in(
     refused = result["run"][result["failure"] == REFUSED]
     if not len(refused):
         return ""
-    study = study_of_law(law, vehicle, n)
     # Only FMUs give a reason.
-    ready = prepare_study(
-        study,
-        Means(engine=FMU, kind=PYTHON),
-        given={study.name: loop_of(law, vehicle, gains)},
-    )
+    ready = prepared(law, vehicle, study_of_law(law, vehicle, n), gains, Means(engine=FMU))
     [outcome] = outcomes_of(ready.engine, ready.space.points(refused[:1]))
     return (
         f"{law.component}: {len(refused)} of {result.runs} runs with {vehicle.name} were refused; "

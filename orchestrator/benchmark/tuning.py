@@ -17,20 +17,18 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fmus.discovery import digest_at
-from fmus.kinds import PYTHON
 from orchestrator.benchmark.contest import (
     Law,
     Vehicle,
-    clear_refusals,
-    loop_of,
     members,
+    prepared,
     study_of_law,
 )
 from orchestrator.benchmark.cost import COLUMNS, costs
 from orchestrator.cosim import PortName
 from orchestrator.studies.columns import Outcomes, Points
 from orchestrator.studies.study import Study
-from orchestrator.studies.sweep import Means, Ready, making_runs, prepare_study
+from orchestrator.studies.sweep import Means, Ready, making_runs
 
 
 class Budget(NamedTuple):
@@ -130,16 +128,14 @@ def training(study: Study, number: int) -> Study:
 def _prepared(law: Law, vehicle: Vehicle, draws: int, number: int, means: Means) -> Ready:
     """Return a law with a vehicle, ready for runs with these draws."""
     study = training(study_of_law(law, vehicle, draws), number)
-    systems = {study.name: loop_of(law, vehicle, {})}
-    with clear_refusals(law):
-        return prepare_study(study, replace(means, kind=PYTHON), given=systems)
+    return prepared(law, vehicle, study, {}, means)
 
 
 def _own(law: Law, ready: Ready) -> np.ndarray:
     """Return the logarithms of the law's own gains; a group has its first member's."""
-    [prepared] = ready.space.prepared.values()
+    [loop] = ready.space.prepared.values()
     firsts = (next(iter(members(law, {name: 0.0}))) for name in law.gains)
-    values: Any = [prepared.system.value(PortName.read(name)) for name in firsts]
+    values: Any = [loop.system.value(PortName.read(name)) for name in firsts]
     # A gain may be zero by default.
     own: np.ndarray = np.log(np.maximum(np.array(values, dtype=float), 1e-9))
     return own
