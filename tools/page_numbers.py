@@ -40,7 +40,7 @@ from datetime import date
 from functools import partial
 from itertools import pairwise
 from itertools import product as combinations
-from math import ceil, cos, exp, log, radians, sin, sqrt
+from math import ceil, cos, exp, log, nan, radians, sin, sqrt
 from pathlib import Path
 from random import Random
 from tempfile import TemporaryDirectory
@@ -50,7 +50,7 @@ import numpy as np
 from scipy.optimize import root
 
 from auv_fmu.bluerov2 import bluerov2, thruster_allocation
-from auv_fmu.bluerov2.thruster_allocation import Parameters, Wanted
+from auv_fmu.bluerov2.thruster_allocation import Wanted
 from auv_fmu.loop import closed_loop
 from auv_fmu.loop.closed_loop import LongestSteps, Setting, Vehicles
 from auv_fmu.navigation.rotations import inverse, logarithm, product
@@ -726,14 +726,17 @@ def show_changes(
     changes: Mapping[str, Values],
     numbers_of: Callable[[Table], Sequence[float]],
 ) -> None:
-    """Print the numbers of a scenario and of its PD controller with changes, over seeds."""
-    rows = []
+    """Print the numbers of a scenario and of its PD controller with changes, over seeds.
+
+    Runs that end early have none: their numbers are nan.
+    """
+    rows, none = [], [nan] * len(columns)
     for (name, values), pd in combinations(changes.items(), ("", "-pd")):
         lacking = ("controller.K2", "controller.k_d") if pd else ()
         shared = {key: value for key, value in values.items() if key not in lacking}
         system, end = system_of(scenario + pd), read_scenario(scenario).stop_time
         made = (simulate(system, {**shared, SEED: k}, stop_time=end) for k in SEEDS)
-        found = np.array([numbers_of(result) for result in made])
+        found = np.array([none if result.failure else numbers_of(result) for result in made])
         rows.append([name, "PD" if pd else "proposed", *map(band, found.T)])
     show(["changed", "controller", *columns], rows)
 
@@ -970,13 +973,14 @@ def bluerov() -> None:
     """
     columns = ("first", "later", "across", "end", "limit", "roll", "pitch", "moves")
     show_changes("bluerov", columns, ROV_CHANGES, bluerov_numbers)
-    derived = thruster_allocation.derive(Parameters())
+    allocation = thruster_allocation.Parameters()
+    derived = thruster_allocation.derive(allocation)
     water = bluerov2.Hydrodynamics()
     wu = (4.03, 18.18), (6.22, 21.66), (5.18, 36.99)
     for k, direction in enumerate(("ahead", "aside", "down")):
         most = tuple(1e6 * (i == k) for i in range(3))
         wanted = Wanted((most[0], 0.0, 0.0), (most[1], most[2], 0.0))
-        force = thruster_allocation.evaluate(Parameters(), derived, wanted)
+        force = thruster_allocation.evaluate(allocation, derived, wanted)
         ours = water.linear[k], water.quadratic[k]
         speeds = (steady_speed(*pair, force.tau_attained[k]) for pair in (ours, wu[k]))
         print(f"{direction}: at most {force.tau_attained[k]:.0f} N, at which the speed is "
